@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use super::PlanningError;
 use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
+use super::error::PlanningError;
 use super::keep_outs::Shapes;
-use super::obstacles::{Obstacles, SeenBlocks};
-use super::surroundings::Unknown;
+use super::unknown::{Obstacles, SeenBlocks, Unknown};
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
 use crate::sync::{Rank, RwLock, RwLockReadGuard};
 use crate::util::StopSignal;

@@ -16,11 +16,16 @@
 
 mod block;
 mod cluster;
+mod cube_search;
+pub(super) mod eight_points;
 mod fields;
 mod level;
+pub(super) mod small_balls;
 
-pub(super) use block::{FAR, LINE_BYTES};
-pub(super) use cluster::FieldCluster;
+#[cfg(test)]
+pub(super) use cube_search::squared_distance;
+pub(super) use cube_search::{CubeSearch, NearestCube};
+pub(super) use eight_points::{Bounds, Centers, Found, LANES, lane_of, lanes_below_zero};
 pub use fields::FIELD_BYTES_MAX_DEFAULT;
 pub(super) use fields::{FieldBlockKey, Fields};
-pub(super) use level::FieldLevel;
+pub(super) use small_balls::Nearby;

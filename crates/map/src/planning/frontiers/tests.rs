@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::map::{KeepOuts, MapView};
-use crate::planning::seen_maps::{SeenMap, seen_history_and_level};
+use crate::planning::tests::{SeenMap, seen_history_and_level};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 

@@ -3,8 +3,8 @@
 use super::frontier::FrontierView;
 use crate::geometry::Pose;
 use crate::map::{MapView, ShapeRay};
-use crate::planning::free_space::FreeSpace;
 use crate::planning::rays::clear_m;
+use crate::planning::unknown::FreeSpace;
 
 /// Directions that are tried for a frontier.
 const DIRECTIONS: usize = 96;

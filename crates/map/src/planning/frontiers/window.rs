@@ -4,7 +4,7 @@ use super::clusters::{Bits, Cluster, FrontierBits};
 use super::frontier::Frontier;
 use super::view_pose::Lookout;
 use crate::map::{KeepOut, MapView};
-use crate::planning::free_space::{ALL, FreeSpace};
+use crate::planning::unknown::{ALL, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey};
 

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use super::cells::Cells;
 use super::occupancy_grid::Grid;
 use super::projection::Projection;
-use crate::planning::free_space::{CELLS, FreeSpace};
+use crate::planning::unknown::{CELLS, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
 

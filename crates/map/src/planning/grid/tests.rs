@@ -3,8 +3,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::seen_maps::seen_history_and_level;
-use crate::planning::test_maps::{RESOLUTION_M, history_and_level};
+use crate::planning::tests::{RESOLUTION_M, history_and_level, seen_history_and_level};
 use crate::util::StopSignal;
 use crate::voxel::{VoxelKey, VoxelSet};
 

@@ -2,9 +2,8 @@
 
 use super::shapes::Shapes;
 use crate::map::KeepOut;
+use crate::planning::body::{CellsFromLink, Link, Sphere};
 use crate::planning::effort::Effort;
-use crate::planning::parts::{Link, Sphere};
-use crate::planning::placement::CellsFromLink;
 
 /// A body: its links, each in its own frame.
 #[derive(Debug)]

@@ -8,9 +8,8 @@
 
 use super::figure::Solid;
 use super::shapes::Shapes;
+use crate::planning::body::{CellsFromLink, LinkMotion};
 use crate::planning::effort::Effort;
-use crate::planning::path::LinkMotion;
-use crate::planning::placement::CellsFromLink;
 
 /// The longest stride past a shape that is near, meters.
 const STRIDE_MAX_M: f64 = 1e-3;

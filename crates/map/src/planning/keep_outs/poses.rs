@@ -3,9 +3,8 @@
 use super::figure::{Figure, Solid};
 use super::shapes::Shapes;
 use crate::planning::answers::{Clearance, Hit, Met};
-use crate::planning::configurations::{Configurations, MAP_FRAME};
+use crate::planning::body::{CellsFromLink, Configurations, LinkPose, MAP_FRAME};
 use crate::planning::effort::Effort;
-use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::util::StopSignal;
 
 /// Something that is asked about again and again, each time elsewhere or another one.

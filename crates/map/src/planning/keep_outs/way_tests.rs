@@ -10,9 +10,8 @@ use super::tests::{BruteForce, RESOLUTION_M, body_and_poses, map, map_of, poses_
 use crate::geometry::Point;
 use crate::map::test_shapes::shape;
 use crate::map::{KeepOutShape, MultiResolutionMap, Prism, Region};
+use crate::planning::body::{LinkMotion, LinkPose};
 use crate::planning::effort::WORK_PER_LOOK;
-use crate::planning::path::LinkMotion;
-use crate::planning::placement::LinkPose;
 use crate::planning::*;
 use crate::util::StopSignal;
 

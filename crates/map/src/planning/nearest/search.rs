@@ -6,7 +6,7 @@ use super::request::MeasuredTo;
 use super::seeker::Seeker;
 use crate::geometry::Point;
 use crate::map::TierView;
-use crate::planning::remembered::Remembered;
+use crate::planning::recent_clusters::Remembered;
 use crate::util::bits::for_each_bit;
 use crate::voxel::{BLOCK_SIDE, BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, Cluster, VoxelKey};
 

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::Point;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::test_maps::{history_and_level, point};
+use crate::planning::tests::{history_and_level, point};
 use crate::util::StopSignal;
 use crate::voxel::{VoxelKey, VoxelSet};
 

@@ -1,15 +1,14 @@
 //! Casting rays: through occupied voxels or through all that is not free, up to the first keep-out.
 
 use super::hits::RayHits;
-use super::in_sight;
-use super::keep_outs;
+use super::interleaved::Turns;
 use super::rays_in_cells::Request;
 use super::request::{RayError, Rays};
 use super::space::Space;
-use super::turns::Turns;
+use super::{in_sight, keep_outs};
 use crate::map::{MapView, TierView};
-use crate::planning::free_space::FreeSpace;
 use crate::planning::keep_outs::Shapes;
+use crate::planning::unknown::FreeSpace;
 use crate::util::StopSignal;
 use crate::voxel::Cluster;
 

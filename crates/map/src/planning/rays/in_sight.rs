@@ -7,7 +7,7 @@ use super::request::RayError;
 use super::space::{Space, Step};
 use crate::map::{MapView, ShapeRay};
 use crate::planning::effort::Effort;
-use crate::planning::free_space::FreeSpace;
+use crate::planning::unknown::FreeSpace;
 use crate::util::StopSignal;
 use crate::voxel::Cluster;
 

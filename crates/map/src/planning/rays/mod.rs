@@ -4,6 +4,7 @@ mod cast;
 mod clear_box;
 mod hits;
 mod in_sight;
+mod interleaved;
 mod keep_outs;
 mod ray;
 mod rays_in_cells;
@@ -11,7 +12,6 @@ mod request;
 mod space;
 #[cfg(test)]
 mod tests;
-mod turns;
 
 pub use cast::{cast_rays, cast_rays_in_sight};
 pub use hits::RayHits;

@@ -3,8 +3,8 @@
 use super::clear_box::{Blocks, clear_box};
 use super::ray::{Place, Ray};
 use crate::map::{CellBounds, TierView};
-use crate::planning::free_space::FreeSpace;
-use crate::planning::remembered::Remembered;
+use crate::planning::recent_clusters::Remembered;
+use crate::planning::unknown::FreeSpace;
 use crate::voxel::{BLOCK_LEVELS, BlockInCluster, BlockMask, Cell, Cluster, VoxelKey};
 
 /// The voxels of one level.

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::Point;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::test_maps::{RESOLUTION_M, history_and_level, point};
+use crate::planning::tests::{RESOLUTION_M, history_and_level, point};
 use crate::util::StopSignal;
 use crate::voxel::{VoxelKey, VoxelSet};
 

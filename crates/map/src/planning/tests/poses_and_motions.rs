@@ -10,7 +10,7 @@ use super::made::{
     surroundings,
 };
 use crate::map::{MapSettings, MultiResolutionMap};
-use crate::planning::placement::LinkPose;
+use crate::planning::body::LinkPose;
 use crate::planning::*;
 use crate::util::StopSignal;
 
