@@ -12,8 +12,8 @@ use crate::util::StopSignal;
 use crate::visibility::ViewpointSet;
 use crate::voxel::Lattice;
 
-/// Blocks that are made between two looks at the stop signal.
-const MADE_PER_LOOK: usize = 32;
+/// Blocks that are made between two checks of the stop signal.
+const MADE_PER_STOP_CHECK: usize = 32;
 
 /// Answers planners' questions about a map.
 ///
@@ -172,7 +172,7 @@ impl PlanningView<'_> {
         let seen = if is_known { fields.seen_around(&unmade) } else { SeenBlocks::new() };
         drop(fields);
         let mut obstacles = Obstacles::of(&self.view, unknown, seen);
-        let made = stop.paced(unmade, MADE_PER_LOOK).map(|key| (key, key.make(&mut obstacles)));
+        let made = stop.paced(unmade, MADE_PER_STOP_CHECK).map(|key| (key, key.make(&mut obstacles)));
         let blocks = made.collect();
         let mut fields = self.planner.fields.write();
         if self.holds(&fields, unknown) {

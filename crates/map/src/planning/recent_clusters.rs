@@ -3,12 +3,12 @@
 use crate::map::TierView;
 use crate::voxel::{Cluster, VoxelKey};
 
-/// How many are remembered: a power of two along each axis, as many as a large room has.
-const REMEMBERED: [u32; 3] = [3, 3, 2];
-const COUNT: usize = 1 << (REMEMBERED[0] + REMEMBERED[1] + REMEMBERED[2]);
+/// How many are kept: a power of two along each axis, as many as a large room has.
+const RECENT: [u32; 3] = [3, 3, 2];
+const COUNT: usize = 1 << (RECENT[0] + RECENT[1] + RECENT[2]);
 
 /// The clusters of a view by their pieces (see [`TierView::piece_levels`]), those that were met last near at hand.
-pub(super) struct Remembered<'a> {
+pub(super) struct RecentClusters<'a> {
     view: TierView<'a>,
     piece_levels: u32,
     /// Stands for clusters that are not there.
@@ -16,7 +16,7 @@ pub(super) struct Remembered<'a> {
     clusters: Box<[(VoxelKey, &'a Cluster); COUNT]>,
 }
 
-impl<'a> Remembered<'a> {
+impl<'a> RecentClusters<'a> {
     /// None of the clusters of `view` yet; `nothing` is a cluster without a block.
     pub(super) fn new(view: TierView<'a>, nothing: &'a Cluster) -> Self {
         // Only the piece at the origin has this key, and its place is the first.
@@ -36,8 +36,8 @@ impl<'a> Remembered<'a> {
         let piece = cell.map(|i| i >> self.piece_levels);
         let key = VoxelKey::pack(piece);
         let [x, y, z]: [usize; 3] =
-            std::array::from_fn(|axis| (piece[axis] & ((1 << REMEMBERED[axis]) - 1)) as usize);
-        let place = x | y << REMEMBERED[0] | z << (REMEMBERED[0] + REMEMBERED[1]);
+            std::array::from_fn(|axis| (piece[axis] & ((1 << RECENT[axis]) - 1)) as usize);
+        let place = x | y << RECENT[0] | z << (RECENT[0] + RECENT[1]);
         if self.clusters[place].0 != key {
             self.remember(place, key, cell);
         }

@@ -1,17 +1,21 @@
 //! The kinds of answers for one configuration: a bit, the first hit, the clearance.
 
 use super::configuration::{Configuration, NearestLink};
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use crate::planning::answers::{CLEARANCE_CELLS_MAX, Clearance, Hit, Met};
 use crate::planning::error::PlanningError;
 
 /// A kind of answer.
-pub(super) trait Kind {
+pub(super) trait AnswerKind {
     /// The answer.
     type Answer;
 
     /// The answer for a configuration that is placed; none where it waits for a part of the field.
-    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Self::Answer>;
+    fn answer(
+        &self,
+        configuration: &mut Configuration<'_>,
+        lookup: &mut FieldLookup<'_>,
+    ) -> Option<Self::Answer>;
 }
 
 /// Does the body meet a voxel?
@@ -55,31 +59,39 @@ impl Clearances {
     }
 }
 
-impl Kind for Meets {
+impl AnswerKind for Meets {
     type Answer = bool;
 
     #[inline(always)]
-    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<bool> {
-        configuration.meets(look)
+    fn answer(&self, configuration: &mut Configuration<'_>, lookup: &mut FieldLookup<'_>) -> Option<bool> {
+        configuration.meets(lookup)
     }
 }
 
-impl Kind for FirstHits {
+impl AnswerKind for FirstHits {
     type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Option<Hit>> {
-        let hit = configuration.first_hit(look)?;
+    fn answer(
+        &self,
+        configuration: &mut Configuration<'_>,
+        lookup: &mut FieldLookup<'_>,
+    ) -> Option<Option<Hit>> {
+        let hit = configuration.first_hit(lookup)?;
         Some(hit.map(|hit| Hit { link: hit.link as u32, part: hit.part as u32, met: Met::Voxel(hit.voxel) }))
     }
 }
 
-impl Kind for Clearances {
+impl AnswerKind for Clearances {
     type Answer = Clearance;
 
     #[inline(always)]
-    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Clearance> {
-        let NearestLink { distance, link } = configuration.nearest(look, self.most)?;
+    fn answer(
+        &self,
+        configuration: &mut Configuration<'_>,
+        lookup: &mut FieldLookup<'_>,
+    ) -> Option<Clearance> {
+        let NearestLink { distance, link } = configuration.nearest(lookup, self.most)?;
         Some(Clearance { distance_m: self.told_m(distance), link: link.map(|link| link as u32) })
     }
 }

@@ -1,8 +1,8 @@
 //! One configuration: does the body meet a voxel, which first, and how far is it from one.
 
-use super::field_lookup::{FoundGroup, Look};
-use super::found_spheres::Aim;
-use super::pipeline::{InSteps, Unanswered};
+use super::field_lookup::{FieldLookup, FoundGroup};
+use super::found_spheres::FoundSpheres;
+use super::pipeline::{Staged, Unanswered};
 use super::{link, points};
 use crate::planning::body::{BodyInCells, CellsFromLink, EightTransforms, LinkPose, NUMBERS_PER_POSE};
 use crate::planning::clearance::LANES;
@@ -21,41 +21,42 @@ pub(super) struct Configuration<'a> {
     near: Vec<usize>,
 }
 
-/// One configuration after the other, in steps: see [`pipeline`](super::pipeline).
+/// A configuration on its way through the stages of the [`pipeline`](super::pipeline), one after the other.
 #[derive(Debug)]
-pub(super) struct InTurn<'a, 'o, 'f> {
+pub(super) struct StagedConfiguration<'a, 'o, 'f> {
     configuration: Configuration<'a>,
     unanswered: Unanswered<'a, 'o>,
     place: usize,
     /// The balls around the links, eight at a time.
     balls: Vec<FoundGroup<'f>>,
     /// The spheres of links that are not clear.
-    aim: Aim<'a, 'f>,
+    spheres: FoundSpheres<'a, 'f>,
 }
 
-impl<'a, 'o> InTurn<'a, 'o, '_> {
+impl<'a, 'o> StagedConfiguration<'a, 'o, '_> {
     pub(super) fn new(body: &'a BodyInCells, cells_per_m: f64, unanswered: Unanswered<'a, 'o>) -> Self {
         let configuration = Configuration::new(body, cells_per_m);
-        Self { configuration, unanswered, place: 0, balls: Vec::new(), aim: Aim::default() }
+        Self { configuration, unanswered, place: 0, balls: Vec::new(), spheres: FoundSpheres::default() }
     }
 }
 
-impl<'f> InSteps<'f> for InTurn<'_, '_, 'f> {
+impl<'f> Staged<'f> for StagedConfiguration<'_, '_, 'f> {
     #[inline(always)]
-    fn begin(&mut self, look: &mut Look<'f>, part: usize) {
+    fn begin(&mut self, lookup: &mut FieldLookup<'f>, part: usize) {
         self.place = part;
         self.configuration.place(self.unanswered.poses_of(part));
-        self.configuration.find_balls(look, &mut self.balls);
+        self.configuration.find_balls(lookup, &mut self.balls);
     }
 
     #[inline(always)]
-    fn go_on(&mut self, look: &mut Look<'f>) {
-        self.configuration.find_spheres(look, &self.balls, &mut self.aim);
+    fn go_on(&mut self, lookup: &mut FieldLookup<'f>) {
+        self.configuration.find_spheres(lookup, &self.balls, &mut self.spheres);
     }
 
     #[inline(always)]
-    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
-        answers[self.unanswered.items[self.place]] = self.configuration.meets_found(look, &mut self.aim);
+    fn end(&mut self, lookup: &mut FieldLookup<'f>, answers: &mut [Option<bool>]) {
+        answers[self.unanswered.items[self.place]] =
+            self.configuration.meets_found(lookup, &mut self.spheres);
     }
 }
 
@@ -97,11 +98,11 @@ impl<'a> Configuration<'a> {
 
     /// Notes the links of whose surroundings the field does not say that nothing is in them.
     #[inline(always)]
-    fn note_near(&mut self, look: &mut Look<'_>) {
+    fn note_near(&mut self, lookup: &mut FieldLookup<'_>) {
         self.near.clear();
         for (eight, (balls, transforms)) in self.body.balls.iter().zip(&self.transforms).enumerate() {
-            let judged = look.judge(balls, &balls.centers_of_each(transforms));
-            for_each_bit(u64::from(judged.meets | judged.is_open), |lane| {
+            let bounds = lookup.classify_spheres(balls, &balls.centers_of_each(transforms));
+            for_each_bit(u64::from(bounds.meets | bounds.is_open), |lane| {
                 self.near.push(eight * LANES + lane as usize);
             });
         }
@@ -109,94 +110,99 @@ impl<'a> Configuration<'a> {
 
     /// True where the body meets a voxel; none where a part of the field is waited for.
     #[inline(always)]
-    pub(super) fn meets(&mut self, look: &mut Look<'_>) -> Option<bool> {
-        let (mut balls, mut aim) = (Vec::new(), Aim::default());
-        self.find_balls(look, &mut balls);
-        self.find_spheres(look, &balls, &mut aim);
-        self.meets_found(look, &mut aim)
+    pub(super) fn meets(&mut self, lookup: &mut FieldLookup<'_>) -> Option<bool> {
+        let (mut balls, mut spheres) = (Vec::new(), FoundSpheres::default());
+        self.find_balls(lookup, &mut balls);
+        self.find_spheres(lookup, &balls, &mut spheres);
+        self.meets_found(lookup, &mut spheres)
     }
 
     /// Finds the balls around the links in the field.
     #[inline(always)]
-    fn find_balls<'f>(&self, look: &mut Look<'f>, found: &mut Vec<FoundGroup<'f>>) {
+    fn find_balls<'f>(&self, lookup: &mut FieldLookup<'f>, found: &mut Vec<FoundGroup<'f>>) {
         found.resize(self.body.balls.len(), FoundGroup::NOTHING);
         let balls = self.body.balls.iter().zip(&self.transforms);
         for ((balls, transforms), found) in balls.zip(found) {
-            look.find(balls, &balls.centers_of_each(transforms), found);
+            lookup.find(balls, &balls.centers_of_each(transforms), found);
         }
     }
 
     /// Finds the spheres of the links that are not clear.
     #[inline(always)]
-    fn find_spheres<'f>(&mut self, look: &mut Look<'f>, balls: &[FoundGroup<'f>], aim: &mut Aim<'a, 'f>) {
+    fn find_spheres<'f>(
+        &mut self,
+        lookup: &mut FieldLookup<'f>,
+        balls: &[FoundGroup<'f>],
+        spheres: &mut FoundSpheres<'a, 'f>,
+    ) {
         self.near.clear();
         for (eight, (balls, found)) in self.body.balls.iter().zip(balls).enumerate() {
-            let judged = look.judge_found(balls, found);
-            for_each_bit(u64::from(judged.meets | judged.is_open), |lane| {
+            let bounds = lookup.classify_found(balls, found);
+            for_each_bit(u64::from(bounds.meets | bounds.is_open), |lane| {
                 self.near.push(eight * LANES + lane as usize);
             });
         }
-        aim.clear();
+        spheres.clear();
         for &number in &self.near {
             let cells_from_link = self.cells_from_link(number);
             for group in &self.body.links[number].groups {
-                aim.add(look, group, &cells_from_link);
+                spheres.add(lookup, group, &cells_from_link);
             }
         }
     }
 
     /// Reads what was found.
     #[inline(always)]
-    fn meets_found(&self, look: &mut Look<'_>, aim: &mut Aim<'_, '_>) -> Option<bool> {
-        let do_spheres = aim.meets(look, 0..aim.len())?;
-        Some(do_spheres || self.points_meet(look))
+    fn meets_found(&self, lookup: &mut FieldLookup<'_>, spheres: &mut FoundSpheres<'_, '_>) -> Option<bool> {
+        let do_spheres = spheres.meets(lookup, 0..spheres.len())?;
+        Some(do_spheres || self.points_meet(lookup))
     }
 
-    fn points_meet(&self, look: &mut Look<'_>) -> bool {
+    fn points_meet(&self, lookup: &mut FieldLookup<'_>) -> bool {
         self.near.iter().any(|&number| {
             let pose = LinkPose::of(&self.poses[number]);
-            points::meet(look, &self.body.links[number], &pose, &self.cells_from_link(number))
+            points::meet(lookup, &self.body.links[number], &pose, &self.cells_from_link(number))
         })
     }
 
     /// What the body meets first: in the order of links, in a link spheres before points.
-    pub(super) fn first_hit(&mut self, look: &mut Look<'_>) -> Option<Option<FirstHit>> {
-        self.note_near(look);
+    pub(super) fn first_hit(&mut self, lookup: &mut FieldLookup<'_>) -> Option<Option<FirstHit>> {
+        self.note_near(lookup);
         let mut unmade = 0;
         for &number in &self.near {
             let (link, cells_from_link) = (&self.body.links[number], self.cells_from_link(number));
-            let hit = link::first_sphere(look, link, &cells_from_link, &mut unmade);
-            if look.waits_for(unmade) {
+            let hit = link::first_sphere(lookup, link, &cells_from_link, &mut unmade);
+            if lookup.waits_for(unmade) {
                 continue;
             }
             let hit = hit.or_else(|| {
                 let spheres = link.spheres;
                 let hit =
-                    points::first_hit(look, link, &LinkPose::of(&self.poses[number]), &cells_from_link)?;
+                    points::first_hit(lookup, link, &LinkPose::of(&self.poses[number]), &cells_from_link)?;
                 Some((spheres + hit.point, hit.voxel))
             });
             if let Some((part, voxel)) = hit {
                 return Some(Some(FirstHit { link: number, part, voxel }));
             }
         }
-        (!look.waits_for(unmade)).then_some(None)
+        (!lookup.waits_for(unmade)).then_some(None)
     }
 
     /// The distance from the body to the nearest voxel, cells, 0 where they meet; `most` where that is more.
-    pub(super) fn nearest(&mut self, look: &mut Look<'_>, most: f64) -> Option<NearestLink> {
+    pub(super) fn nearest(&mut self, lookup: &mut FieldLookup<'_>, most: f64) -> Option<NearestLink> {
         let (mut unmade, mut upper) = (0, most);
         for (number, link) in self.body.links.iter().enumerate() {
             let cells_from_link = self.cells_from_link(number);
-            upper = upper.min(link::upper_bound(look, link, &cells_from_link, &mut unmade));
+            upper = upper.min(link::upper_bound(lookup, link, &cells_from_link, &mut unmade));
         }
-        if look.waits_for(unmade) {
+        if lookup.waits_for(unmade) {
             return None;
         }
         let mut nearest = NearestLink { distance: most, link: None };
         for (number, link) in self.body.links.iter().enumerate() {
             // What is further than something else is known to be is passed over.
             let bound = upper.max(0.0).min(nearest.distance);
-            let distance = link::nearest(look, link, &self.cells_from_link(number), bound);
+            let distance = link::nearest(lookup, link, &self.cells_from_link(number), bound);
             if let Some(distance) = distance.filter(|distance| *distance < nearest.distance) {
                 nearest = NearestLink { distance, link: Some(number) };
             }

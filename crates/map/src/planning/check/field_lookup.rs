@@ -1,9 +1,9 @@
-//! A look at a level: the field where it decides, the voxels themselves where it does not.
+//! The look-up of a question at a level: the field where it decides, the voxels themselves where it does not.
 
 use crate::map::MapView;
 use crate::planning::body::Group;
 use crate::planning::clearance::{
-    Bounds, Centers, CubeSearch, FieldBlockKey, Fields, Found, LANES, Nearby, NearestCube, eight_points,
+    BallState, Bounds, Centers, CubeSearch, FieldBlockKey, Fields, Found, LANES, NearestCube, eight_points,
     small_balls,
 };
 use crate::planning::effort::Effort;
@@ -11,7 +11,7 @@ use crate::planning::unknown::{FreeSpace, Surroundings};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
-/// Most blocks of the field that are made between two looks.
+/// Most blocks of the field that are made after one round.
 pub(in crate::planning) const UNMADE_MAX: usize = 4096;
 
 /// A coarse voxel holds a fine one, which is no further away than the coarse one and its diagonal, in coarse cells.
@@ -19,7 +19,7 @@ const DIAGONAL: f32 = 1.7321;
 
 /// Level, field and voxels, as a question reads them.
 #[derive(Debug)]
-pub(super) struct Look<'a> {
+pub(super) struct FieldLookup<'a> {
     pub(super) view: &'a MapView<'a>,
     pub(super) surroundings: &'a Surroundings,
     pub(super) level: u32,
@@ -30,7 +30,7 @@ pub(super) struct Look<'a> {
     unmade: Vec<FieldBlockKey>,
     /// True once so many are to be made that the rest has to wait.
     is_full: bool,
-    /// True where what is not made is not waited for: the voxels answer.
+    /// True in the last round: blocks that are not made are not waited for, the exact search of the voxels answers instead.
     pub(super) is_last: bool,
     effort: Effort<'a>,
 }
@@ -63,9 +63,9 @@ impl FoundGroup<'_> {
     }
 }
 
-/// What the field says of eight spheres.
+/// What the field says of eight spheres: bounds of their distances, and which of them meet a voxel.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Judgment {
+pub(super) struct SphereBounds {
     /// The spheres that meet a voxel.
     pub(super) meets: u8,
     /// Those of which the field does not say.
@@ -77,7 +77,7 @@ pub(super) struct Judgment {
     pub(super) upper: [f32; LANES],
 }
 
-impl<'a> Look<'a> {
+impl<'a> FieldLookup<'a> {
     pub(super) fn new(
         view: &'a MapView<'a>,
         surroundings: &'a Surroundings,
@@ -132,21 +132,21 @@ impl<'a> Look<'a> {
         self.effort.is_stopped()
     }
 
-    /// What the field says of the spheres of `group` with these centers, cells.
+    /// Classifies the spheres of `group` with these centers, cells, by what the field says of them.
     #[inline(always)]
-    pub(super) fn judge(&mut self, group: &Group, centers: &Centers) -> Judgment {
+    pub(super) fn classify_spheres(&mut self, group: &Group, centers: &Centers) -> SphereBounds {
         let mut found = FoundGroup::NOTHING;
         self.find(group, centers, &mut found);
-        self.judge_found(group, &found)
+        self.classify_found(group, &found)
     }
 
-    /// Where the field says it.
+    /// Finds where the field says it.
     #[inline(always)]
     pub(super) fn find(&mut self, group: &Group, centers: &Centers, found: &mut FoundGroup<'a>) {
         self.find_in(group.coarser_by, centers, found);
     }
 
-    /// [`Look::find`] in the field of a level so many levels coarser, or of the coarsest.
+    /// [`FieldLookup::find`] in the field of a level so many levels coarser, or of the coarsest.
     #[inline(always)]
     fn find_in(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
         self.effort.spend(1);
@@ -161,9 +161,9 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// What it says there.
+    /// Classifies the spheres of `group` by what the field says where they were found.
     #[inline(always)]
-    pub(super) fn judge_found(&self, group: &Group, found: &FoundGroup<'_>) -> Judgment {
+    pub(super) fn classify_found(&self, group: &Group, found: &FoundGroup<'_>) -> SphereBounds {
         let Bounds { lower, upper } = found.bounds();
         let (mut low, mut high) = ([0f32; LANES], [0f32; LANES]);
         for lane in 0..LANES {
@@ -178,7 +178,7 @@ impl<'a> Look<'a> {
             (meets, high) = (0, [f32::INFINITY; LANES]);
         }
         let unmade = found.unmade & is_near;
-        Judgment { meets, is_open: is_near & !meets, unmade, lower: low, upper: high }
+        SphereBounds { meets, is_open: is_near & !meets, unmade, lower: low, upper: high }
     }
 
     /// Notes what is to be made; the lanes of which there is something to make.
@@ -210,10 +210,10 @@ impl<'a> Look<'a> {
     pub(super) fn meets(&mut self, center: [f64; 3], radius: f64) -> bool {
         if !self.surroundings.ignores_some() {
             match small_balls::ask(self.fields.level(self.surroundings.unknown, self.level), center, radius) {
-                Nearby::Meets => return true,
-                Nearby::IsFree => return false,
-                Nearby::Unknown => {}
-                Nearby::Unmade(cell) => {
+                BallState::Meets => return true,
+                BallState::IsFree => return false,
+                BallState::Unknown => {}
+                BallState::Unmade(cell) => {
                     let block = VoxelKey::pack(cell.map(|i| i >> BLOCK_LEVELS));
                     self.note(FieldBlockKey { unknown: self.surroundings.unknown, level: self.level, block });
                 }

@@ -2,22 +2,22 @@
 
 use std::ops::Range;
 
-use super::field_lookup::{FoundGroup, Judgment, Look};
+use super::field_lookup::{FieldLookup, FoundGroup, SphereBounds};
 use crate::planning::body::{CellsFromLink, EightTransforms, Group};
 use crate::planning::clearance::{Centers, LANES, eight_points};
 use crate::util::bits::for_each_bit;
 
 /// Groups of spheres where they are, found in the field and not read yet.
 #[derive(Debug, Default)]
-pub(super) struct Aim<'a, 'f> {
-    /// The first so many. The others are from before: where they lie, a place is found without being copied.
-    groups: Vec<AimedGroup<'a, 'f>>,
+pub(super) struct FoundSpheres<'a, 'f> {
+    /// Only the first `count` are valid. The others are kept: a look-up is written where it lies, and not copied.
+    groups: Vec<PlacedGroup<'a, 'f>>,
     count: usize,
     open: OpenSpheres,
 }
 
 #[derive(Debug)]
-struct AimedGroup<'a, 'f> {
+struct PlacedGroup<'a, 'f> {
     group: &'a Group,
     centers: Centers,
     found: FoundGroup<'f>,
@@ -36,19 +36,19 @@ impl OpenSpheres {
         self.0.clear();
     }
 
-    /// Notes those of a group with these centers that were judged to be open.
+    /// Notes those of a group with these centers that are classified as open.
     #[inline(always)]
-    pub(super) fn note(&mut self, judged: &Judgment, group: &Group, centers: &Centers) {
-        for_each_bit(u64::from(judged.is_open), |lane| {
+    pub(super) fn note(&mut self, bounds: &SphereBounds, group: &Group, centers: &Centers) {
+        for_each_bit(u64::from(bounds.is_open), |lane| {
             self.0.push((eight_points::lane_of(centers, lane as usize), group.radius[lane as usize]));
         });
     }
 
     /// True where one of them meets a voxel.
     #[inline(always)]
-    pub(super) fn meet(&self, look: &mut Look<'_>) -> bool {
+    pub(super) fn meet(&self, lookup: &mut FieldLookup<'_>) -> bool {
         for (center, radius) in &self.0 {
-            if look.meets(*center, *radius) {
+            if lookup.meets(*center, *radius) {
                 return true;
             }
         }
@@ -56,7 +56,7 @@ impl OpenSpheres {
     }
 }
 
-impl<'a, 'f> Aim<'a, 'f> {
+impl<'a, 'f> FoundSpheres<'a, 'f> {
     /// Forgets all groups.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
@@ -71,46 +71,56 @@ impl<'a, 'f> Aim<'a, 'f> {
 
     /// Finds one more group of a link in the field.
     #[inline(always)]
-    pub(super) fn add(&mut self, look: &mut Look<'f>, group: &'a Group, cells_from_link: &CellsFromLink) {
-        self.add_at(look, group, group.centers(cells_from_link));
+    pub(super) fn add(
+        &mut self,
+        lookup: &mut FieldLookup<'f>,
+        group: &'a Group,
+        cells_from_link: &CellsFromLink,
+    ) {
+        self.add_at(lookup, group, group.centers(cells_from_link));
     }
 
     /// Finds one more sphere of a link at eight places in the field.
     #[inline(always)]
-    pub(super) fn add_single(&mut self, look: &mut Look<'f>, single: &'a Group, places: &EightTransforms) {
-        self.add_at(look, single, single.centers_of_each(places));
+    pub(super) fn add_single(
+        &mut self,
+        lookup: &mut FieldLookup<'f>,
+        single: &'a Group,
+        places: &EightTransforms,
+    ) {
+        self.add_at(lookup, single, single.centers_of_each(places));
     }
 
     #[inline(always)]
-    fn add_at(&mut self, look: &mut Look<'f>, group: &'a Group, centers: Centers) {
+    fn add_at(&mut self, lookup: &mut FieldLookup<'f>, group: &'a Group, centers: Centers) {
         if self.count == self.groups.len() {
             let (centers, found) = ([[0.0; LANES]; 3], FoundGroup::NOTHING);
-            self.groups.push(AimedGroup { group, centers, found, is_open: 0 });
+            self.groups.push(PlacedGroup { group, centers, found, is_open: 0 });
         }
-        let aimed = &mut self.groups[self.count];
-        (aimed.group, aimed.centers) = (group, centers);
-        look.find(group, &aimed.centers, &mut aimed.found);
+        let placed = &mut self.groups[self.count];
+        (placed.group, placed.centers) = (group, centers);
+        lookup.find(group, &placed.centers, &mut placed.found);
         self.count += 1;
     }
 
     /// Of spheres at eight places, added one by one: those of `places` where a sphere meets a voxel, and those where a part of
     /// the field is waited for.
     #[inline(always)]
-    pub(super) fn singles_meet(&mut self, look: &mut Look<'_>, places: u8) -> (u8, u8) {
+    pub(super) fn singles_meet(&mut self, lookup: &mut FieldLookup<'_>, places: u8) -> (u8, u8) {
         let (mut meets, mut unmade) = (0, 0);
-        for aimed in &mut self.groups[..self.count] {
-            let judged = look.judge_found(aimed.group, &aimed.found);
-            meets |= judged.meets & places;
-            unmade |= judged.unmade & places;
-            aimed.is_open = judged.is_open & places;
+        for placed in &mut self.groups[..self.count] {
+            let bounds = lookup.classify_found(placed.group, &placed.found);
+            meets |= bounds.meets & places;
+            unmade |= bounds.unmade & places;
+            placed.is_open = bounds.is_open & places;
         }
-        let waits = if look.waits_for(unmade) { unmade & !meets } else { 0 };
-        for aimed in &self.groups[..self.count] {
-            let is_open = aimed.is_open & !meets & !waits;
+        let waits = if lookup.waits_for(unmade) { unmade & !meets } else { 0 };
+        for placed in &self.groups[..self.count] {
+            let is_open = placed.is_open & !meets & !waits;
             for place in 0..LANES {
                 if is_open >> place & 1 == 1 {
-                    let center = eight_points::lane_of(&aimed.centers, place);
-                    meets |= u8::from(look.meets(center, aimed.group.radius[place])) << place;
+                    let center = eight_points::lane_of(&placed.centers, place);
+                    meets |= u8::from(lookup.meets(center, placed.group.radius[place])) << place;
                 }
             }
         }
@@ -119,17 +129,17 @@ impl<'a, 'f> Aim<'a, 'f> {
 
     /// True where a sphere of some of the groups meets a voxel; none where a part of the field is waited for.
     #[inline(always)]
-    pub(super) fn meets(&mut self, look: &mut Look<'_>, groups: Range<usize>) -> Option<bool> {
+    pub(super) fn meets(&mut self, lookup: &mut FieldLookup<'_>, groups: Range<usize>) -> Option<bool> {
         self.open.clear();
         let mut unmade = 0;
-        for AimedGroup { group, centers, found, .. } in &self.groups[groups] {
-            let judged = look.judge_found(group, found);
-            if judged.meets != 0 {
+        for PlacedGroup { group, centers, found, .. } in &self.groups[groups] {
+            let bounds = lookup.classify_found(group, found);
+            if bounds.meets != 0 {
                 return Some(true);
             }
-            unmade |= judged.unmade;
-            self.open.note(&judged, group, centers);
+            unmade |= bounds.unmade;
+            self.open.note(&bounds, group, centers);
         }
-        (!look.waits_for(unmade)).then(|| self.open.meet(look))
+        (!lookup.waits_for(unmade)).then(|| self.open.meet(lookup))
     }
 }

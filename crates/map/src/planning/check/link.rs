@@ -1,6 +1,6 @@
 //! One link at one pose.
 
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use super::found_spheres::OpenSpheres;
 use super::points;
 use crate::planning::body::{CellsFromLink, LinkInCells, LinkPose};
@@ -13,21 +13,21 @@ const FIELD_CELLS: f64 = 7.0;
 /// The first sphere of a link that meets a voxel, and the nearest voxel to its center. While a part of the field is waited
 /// for, which `unmade` then says, none.
 pub(super) fn first_sphere(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     cells_from_link: &CellsFromLink,
     unmade: &mut u8,
 ) -> Option<(usize, VoxelKey)> {
     for (eight, group) in link.groups.iter().enumerate() {
         let centers = group.centers(cells_from_link);
-        let judged = look.judge(group, &centers);
-        *unmade |= judged.unmade;
-        let near = judged.meets | judged.is_open;
+        let bounds = lookup.classify_spheres(group, &centers);
+        *unmade |= bounds.unmade;
+        let near = bounds.meets | bounds.is_open;
         for lane in (0..LANES).filter(|lane| near >> lane & 1 == 1) {
-            if look.waits_for(*unmade) {
+            if lookup.waits_for(*unmade) {
                 break;
             }
-            if let Some(nearest) = look.nearest(lane_of(&centers, lane), group.radius[lane]) {
+            if let Some(nearest) = lookup.nearest(lane_of(&centers, lane), group.radius[lane]) {
                 return Some((eight * LANES + lane, nearest.voxel));
             }
         }
@@ -37,23 +37,23 @@ pub(super) fn first_sphere(
 
 /// An upper bound of the distance from the link to the nearest voxel, cells.
 pub(super) fn upper_bound(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     cells_from_link: &CellsFromLink,
     unmade: &mut u8,
 ) -> f64 {
     let mut upper = f64::INFINITY;
     for group in link.groups.iter().chain(&link.point_groups) {
-        let judged = look.judge(group, &group.centers(cells_from_link));
-        *unmade |= judged.unmade;
-        upper = judged.upper.iter().fold(upper, |upper, high| upper.min(f64::from(*high)));
+        let bounds = lookup.classify_spheres(group, &group.centers(cells_from_link));
+        *unmade |= bounds.unmade;
+        upper = bounds.upper.iter().fold(upper, |upper, high| upper.min(f64::from(*high)));
     }
     upper
 }
 
 /// The distance from the link to the nearest voxel, cells, 0 where they meet; none where it is more than `most`.
 pub(super) fn nearest(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     cells_from_link: &CellsFromLink,
     most: f64,
@@ -61,12 +61,12 @@ pub(super) fn nearest(
     let (mut most, mut nearest) = (most, None);
     for group in link.groups.iter().chain(&link.point_groups) {
         let centers = group.centers(cells_from_link);
-        let judged = look.judge(group, &centers);
+        let bounds = lookup.classify_spheres(group, &centers);
         for lane in 0..LANES {
-            if f64::from(judged.lower[lane]) > most {
+            if f64::from(bounds.lower[lane]) > most {
                 continue;
             }
-            if let Some(distance) = distance(look, lane_of(&centers, lane), group.radius[lane], most) {
+            if let Some(distance) = distance(lookup, lane_of(&centers, lane), group.radius[lane], most) {
                 (most, nearest) = (distance, Some(distance));
             }
         }
@@ -75,20 +75,24 @@ pub(super) fn nearest(
 }
 
 /// The distance from a sphere to the nearest voxel, cells, 0 where they meet; none where it is more than `most`.
-fn distance(look: &mut Look<'_>, center: [f64; 3], radius: f64, most: f64) -> Option<f64> {
-    if radius + most > FIELD_CELLS && look.far_lower_bound(center, radius + most) > radius + most {
+fn distance(lookup: &mut FieldLookup<'_>, center: [f64; 3], radius: f64, most: f64) -> Option<f64> {
+    if radius + most > FIELD_CELLS && lookup.far_lower_bound(center, radius + most) > radius + most {
         return None;
     }
-    let nearest = look.nearest(center, radius + most)?;
+    let nearest = lookup.nearest(center, radius + most)?;
     Some((nearest.squared.sqrt() - radius).max(0.0)).filter(|distance| *distance <= most)
 }
 
 /// A lower bound of the distance from the link to the nearest voxel, cells.
-pub(super) fn lower_bound(look: &mut Look<'_>, link: &LinkInCells, cells_from_link: &CellsFromLink) -> f64 {
-    let ball = look.judge(&link.ball_group, &link.ball_group.centers(cells_from_link));
+pub(super) fn lower_bound(
+    lookup: &mut FieldLookup<'_>,
+    link: &LinkInCells,
+    cells_from_link: &CellsFromLink,
+) -> f64 {
+    let ball = lookup.classify_spheres(&link.ball_group, &link.ball_group.centers(cells_from_link));
     let mut lower = f32::INFINITY;
     for group in link.groups.iter().chain(&link.point_groups) {
-        lower = lowest(lower, &look.judge(group, &group.centers(cells_from_link)).lower);
+        lower = lowest(lower, &lookup.classify_spheres(group, &group.centers(cells_from_link)).lower);
     }
     lower.max(ball.lower[0]).max(0.0).into()
 }
@@ -108,14 +112,14 @@ pub(super) enum LinkState {
 /// where that is not clear. `open` is a place for spheres.
 #[inline(always)]
 pub(super) fn state(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     (pose, cells_from_link): (&LinkPose, &CellsFromLink),
     is_near: bool,
     open: &mut OpenSpheres,
 ) -> LinkState {
     if !is_near {
-        let ball = look.judge(&link.ball_group, &link.ball_group.centers(cells_from_link));
+        let ball = lookup.classify_spheres(&link.ball_group, &link.ball_group.centers(cells_from_link));
         if ball.lower[0] > 0.0 {
             return LinkState::IsClear(ball.lower[0].into());
         }
@@ -124,23 +128,23 @@ pub(super) fn state(
     open.clear();
     for group in &link.groups {
         let centers = group.centers(cells_from_link);
-        let judged = look.judge(group, &centers);
-        if judged.meets != 0 {
+        let bounds = lookup.classify_spheres(group, &centers);
+        if bounds.meets != 0 {
             return LinkState::Meets;
         }
-        unmade |= judged.unmade;
-        open.note(&judged, group, &centers);
-        lower = lowest(lower, &judged.lower);
+        unmade |= bounds.unmade;
+        open.note(&bounds, group, &centers);
+        lower = lowest(lower, &bounds.lower);
     }
     for group in &link.point_groups {
-        let judged = look.judge(group, &group.centers(cells_from_link));
-        unmade |= judged.unmade;
-        lower = lowest(lower, &judged.lower);
+        let bounds = lookup.classify_spheres(group, &group.centers(cells_from_link));
+        unmade |= bounds.unmade;
+        lower = lowest(lower, &bounds.lower);
     }
-    if look.waits_for(unmade) {
+    if lookup.waits_for(unmade) {
         return LinkState::Waits;
     }
-    if open.meet(look) || points::meet(look, link, pose, cells_from_link) {
+    if open.meet(lookup) || points::meet(lookup, link, pose, cells_from_link) {
         return LinkState::Meets;
     }
     LinkState::IsClear(lower.max(0.0).into())

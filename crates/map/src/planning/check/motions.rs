@@ -7,7 +7,7 @@
 //! steps. Keep-outs, which may be thinner than any step, are met along the whole way.
 
 use super::answer_kind::Clearances;
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use super::found_spheres::OpenSpheres;
 use super::link::{self, LinkState};
 use super::rounds::Answerer;
@@ -21,13 +21,13 @@ use crate::planning::planner::PlanningView;
 use crate::planning::unknown::Surroundings;
 use crate::util::StopSignal;
 
-/// Motions between two looks at the stop signal.
-const PER_LOOK: usize = 16;
+/// Motions between two checks of the stop signal.
+const PER_STOP_CHECK: usize = 16;
 /// Most steps of a motion between two configurations.
 const STEPS_MAX: u64 = 100_000;
 /// The least step, meters.
 const STEP_MIN_M: f64 = 1e-5;
-/// A link that is clear by less is not asked for by its ball at the next look, cells.
+/// A link that is clear by less is not asked for by its ball at the next step, cells.
 const NEAR_CELLS: f64 = 2.0;
 /// What is taken off a clearance before steps are skipped by it, cells.
 const ROUNDING_CELLS: f64 = 1e-6;
@@ -93,7 +93,7 @@ impl PlanningView<'_> {
         let cells_per_m = self.cells_per_m(question.level)?;
         let body = question.body.in_cells(cells_per_m)?;
         let motions = question.motions(&body, cells_per_m)?;
-        let chunks = (motions.len(), PER_LOOK);
+        let chunks = (motions.len(), PER_STOP_CHECK);
         let MotionQuestion { level, surroundings, .. } = *question;
         let answers = self.each(level, surroundings, chunks, stop, Motions(&motions));
         let Some(shapes) = self.shapes() else { return Ok(answers) };
@@ -115,8 +115,8 @@ impl Answerer for Motions<'_> {
     type Answer = MotionAnswer;
 
     #[inline(always)]
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<MotionAnswer> {
-        self.0[item].answer(look)
+    fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<MotionAnswer> {
+        self.0[item].answer(lookup)
     }
 }
 
@@ -203,11 +203,11 @@ impl MotionQuestion<'_> {
 impl BodyMotion<'_> {
     /// None where a part of the field is waited for.
     #[inline(always)]
-    fn answer(&self, look: &mut Look<'_>) -> Option<MotionAnswer> {
+    fn answer(&self, lookup: &mut FieldLookup<'_>) -> Option<MotionAnswer> {
         let (mut first_hit, mut open) = (None, OpenSpheres::default());
         for (number, segment) in self.segments.iter().enumerate() {
             // The first step of a segment is the last one of that before.
-            let step = self.first_hit(look, segment, u64::from(number > 0), &mut open)?;
+            let step = self.first_hit(lookup, segment, u64::from(number > 0), &mut open)?;
             if let Some(step) = step {
                 let share = step as f64 / segment.steps as f64;
                 first_hit = Some(((number as f64 + share) / self.segments.len() as f64) as f32);
@@ -217,7 +217,7 @@ impl BodyMotion<'_> {
         let clearance_m = match (self.clearances, first_hit) {
             (None, _) => None,
             (Some(_), Some(_)) => Some(0.0),
-            (Some(clearances), None) => Some(clearances.told_m(self.clearance(look, clearances.most())?)),
+            (Some(clearances), None) => Some(clearances.told_m(self.clearance(lookup, clearances.most())?)),
         };
         Some(MotionAnswer { first_hit, clearance_m })
     }
@@ -260,7 +260,7 @@ impl BodyMotion<'_> {
     #[inline(always)]
     fn first_hit(
         &self,
-        look: &mut Look<'_>,
+        lookup: &mut FieldLookup<'_>,
         segment: &Segment,
         first: u64,
         open: &mut OpenSpheres,
@@ -271,12 +271,12 @@ impl BodyMotion<'_> {
             // What was near a voxel a step ago is so now: its ball would say nothing.
             let (mut step, mut is_near) = (first, false);
             while step < end {
-                if look.is_over() {
+                if lookup.is_over() {
                     return None;
                 }
                 let pose = motion.at(step as f64 / segment.steps as f64);
                 let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
-                match link::state(look, link, (&pose, &cells_from_link), is_near, open) {
+                match link::state(lookup, link, (&pose, &cells_from_link), is_near, open) {
                     LinkState::Meets => end = step,
                     LinkState::IsClear(by) => {
                         is_near = by < NEAR_CELLS;
@@ -293,8 +293,8 @@ impl BodyMotion<'_> {
         (!waits).then_some(Some(end).filter(|end| *end <= segment.steps))
     }
 
-    /// The least distance at any step, cells, up to `most`; none once the look is over.
-    fn clearance(&self, look: &mut Look<'_>, most: f64) -> Option<f64> {
+    /// The least distance at any step, cells, up to `most`; none once the look-up is over.
+    fn clearance(&self, lookup: &mut FieldLookup<'_>, most: f64) -> Option<f64> {
         let mut least = most;
         for segment in &self.segments {
             for (link, motion) in self.body.links.iter().zip(&segment.links) {
@@ -302,17 +302,17 @@ impl BodyMotion<'_> {
                     motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
                 let mut step = 0;
                 while step <= segment.steps {
-                    if look.is_over() {
+                    if lookup.is_over() {
                         return None;
                     }
                     let pose = motion.at(step as f64 / segment.steps as f64);
                     let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
-                    let lower = link::lower_bound(look, link, &cells_from_link);
+                    let lower = link::lower_bound(lookup, link, &cells_from_link);
                     if lower > least {
                         step += steps_without(lower - least, per_step);
                         continue;
                     }
-                    least = link::nearest(look, link, &cells_from_link, least).unwrap_or(least);
+                    least = link::nearest(lookup, link, &cells_from_link, least).unwrap_or(least);
                     step += 1;
                 }
             }

@@ -1,10 +1,10 @@
-//! Answers in three steps: while one is given, what the next two need of the field is on its way from memory.
+//! Answers in three stages: while one is given, what the next two need of the field is on its way from memory.
 
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use crate::planning::body::{Configurations, NUMBERS_PER_POSE};
 
-/// Steps of an answer, and so answers under way.
-const STEPS: usize = 3;
+/// Stages of an answer, and so answers under way.
+const STAGES: usize = 3;
 
 /// Configurations that have no answer yet.
 #[derive(Debug, Clone, Copy)]
@@ -23,39 +23,39 @@ impl<'a> Unanswered<'a, '_> {
     }
 }
 
-/// A part of what is unanswered, that goes through its steps as one.
-pub(super) trait InSteps<'f> {
+/// A part of what is unanswered, which goes through the stages as one.
+pub(super) trait Staged<'f> {
     /// Begins with the part of this number: finds what is looked at first.
-    fn begin(&mut self, look: &mut Look<'f>, part: usize);
+    fn begin(&mut self, lookup: &mut FieldLookup<'f>, part: usize);
 
     /// Reads that, and finds what is looked at then.
-    fn go_on(&mut self, look: &mut Look<'f>);
+    fn go_on(&mut self, lookup: &mut FieldLookup<'f>);
 
     /// Reads the rest, and answers by item; nothing where a part of the field is waited for.
-    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]);
+    fn end(&mut self, lookup: &mut FieldLookup<'f>, answers: &mut [Option<bool>]);
 }
 
-/// Takes so many parts through their steps.
+/// Takes so many parts through the stages.
 #[inline(always)]
-pub(super) fn answer_in_steps<'f, P: InSteps<'f>>(
-    look: &mut Look<'f>,
+pub(super) fn answer_staged<'f, P: Staged<'f>>(
+    lookup: &mut FieldLookup<'f>,
     parts: usize,
     new: impl Fn() -> P,
     answers: &mut [Option<bool>],
 ) {
-    let mut under_way: [P; STEPS] = std::array::from_fn(|_| new());
-    for step in 0..parts + STEPS - 1 {
-        if look.is_over() {
+    let mut under_way: [P; STAGES] = std::array::from_fn(|_| new());
+    for step in 0..parts + STAGES - 1 {
+        if lookup.is_over() {
             return;
         }
         if step < parts {
-            under_way[step % STEPS].begin(look, step);
+            under_way[step % STAGES].begin(lookup, step);
         }
         if let Some(part) = step.checked_sub(1).filter(|part| *part < parts) {
-            under_way[part % STEPS].go_on(look);
+            under_way[part % STAGES].go_on(lookup);
         }
         if let Some(part) = step.checked_sub(2) {
-            under_way[part % STEPS].end(look, answers);
+            under_way[part % STAGES].end(lookup, answers);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The points of a link: the field clears most of them, the rest are looked up voxel by voxel.
 
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use crate::planning::body::{CellsFromLink, LinkInCells, LinkPose, POINTS_PER_CLUMP};
 use crate::planning::clearance::{LANES, lanes_below_zero};
 use crate::util::bits::for_each_bit;
@@ -21,13 +21,13 @@ pub(super) struct PointHit {
 
 /// The first point of the link that falls in a voxel that counts, where one does.
 pub(super) fn first_hit(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
 ) -> Option<PointHit> {
     let mut first: Option<PointHit> = None;
-    find(look, link, pose, cells_from_link, |hit| {
+    find(lookup, link, pose, cells_from_link, |hit| {
         if first.is_none_or(|first| hit.point < first.point) {
             first = Some(hit);
         }
@@ -38,39 +38,43 @@ pub(super) fn first_hit(
 
 /// True where a point of the link falls in a voxel that counts.
 pub(super) fn meet(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
 ) -> bool {
-    !link.points.is_empty() && find(look, link, pose, cells_from_link, |_| true)
+    !link.points.is_empty() && find(lookup, link, pose, cells_from_link, |_| true)
 }
 
 /// Gives `is_enough` the points that fall in voxels that count until that is true; true where it was.
 #[inline(always)]
 fn find(
-    look: &mut Look<'_>,
+    lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
     mut is_enough: impl FnMut(PointHit) -> bool,
 ) -> bool {
-    let slack = rounding_cells(link, pose, look.level, look.view.map().lattice().resolution_m(0));
+    let slack = rounding_cells(link, pose, lookup.level, lookup.view.map().lattice().resolution_m(0));
     // Most links have no point near a voxel.
     let mut lattice_from_points = None;
     for (number, balls) in link.clumps.iter().enumerate() {
-        let near = lanes_within(&look.judge(balls, &balls.centers(cells_from_link)).lower, slack);
+        let near =
+            lanes_within(&lookup.classify_spheres(balls, &balls.centers(cells_from_link)).lower, slack);
         for lane in (0..LANES).filter(|lane| near >> lane & 1 == 1) {
             let first = (number * LANES + lane) * EIGHTS;
             let eights = first..link.point_groups.len().min(first + EIGHTS);
             for eight in eights {
                 let points = &link.point_groups[eight];
-                let near = lanes_within(&look.judge(points, &points.centers(cells_from_link)).lower, slack);
+                let near = lanes_within(
+                    &lookup.classify_spheres(points, &points.centers(cells_from_link)).lower,
+                    slack,
+                );
                 let mut is_done = false;
                 for_each_bit(near.into(), |lane| {
                     let lattice_from_points = *lattice_from_points
-                        .get_or_insert_with(|| pose.lattice_from_points(look.view.map().lattice()));
-                    let hit = hit(look, link, eight * LANES + lane as usize, &lattice_from_points);
+                        .get_or_insert_with(|| pose.lattice_from_points(lookup.view.map().lattice()));
+                    let hit = hit(lookup, link, eight * LANES + lane as usize, &lattice_from_points);
                     is_done = is_done || hit.is_some_and(&mut is_enough);
                 });
                 if is_done {
@@ -94,13 +98,13 @@ fn lanes_within(lower: &[f32; LANES], distance: f32) -> u8 {
 
 /// What a point meets, by its place among the clumps' points.
 fn hit(
-    look: &Look<'_>,
+    lookup: &FieldLookup<'_>,
     link: &LinkInCells,
     place: usize,
     lattice_from_points: &LatticeFromPoints,
 ) -> Option<PointHit> {
-    let voxel = lattice_from_points.key(link.points[place])?.ancestor(look.level);
-    look.counts(voxel).then(|| PointHit { point: link.numbers[place], voxel })
+    let voxel = lattice_from_points.key(link.points[place])?.ancestor(lookup.level);
+    lookup.counts(voxel).then(|| PointHit { point: link.numbers[place], voxel })
 }
 
 /// How far from where it is a point may be looked up, in voxels of `level`, rounded up.

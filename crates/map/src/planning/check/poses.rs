@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use super::answer_kind::{Clearances, FirstHits, Kind};
-use super::configuration::{Configuration, InTurn};
-use super::field_lookup::Look;
-use super::pipeline::{Unanswered, answer_in_steps};
+use super::answer_kind::{AnswerKind, Clearances, FirstHits};
+use super::configuration::{Configuration, StagedConfiguration};
+use super::field_lookup::FieldLookup;
+use super::pipeline::{Unanswered, answer_staged};
 use super::rounds::Answerer;
 use super::single_link::EightPlaces;
 use crate::planning::answers::{Clearance, Hit};
@@ -17,8 +17,8 @@ use crate::planning::planner::PlanningView;
 use crate::planning::unknown::Surroundings;
 use crate::util::StopSignal;
 
-/// Configurations between two looks at the stop signal.
-const PER_LOOK: usize = 256;
+/// Configurations between two checks of the stop signal.
+const PER_STOP_CHECK: usize = 256;
 
 /// A body at configurations.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ impl PlanningView<'_> {
         let (body, cells_per_m) = self.in_cells(question)?;
         let PoseQuestion { configurations, level, surroundings, .. } = *question;
         let meeting = Meeting { configurations, body: &body, cells_per_m };
-        let meets = self.each(level, surroundings, (configurations.len(), PER_LOOK), stop, meeting);
+        let meets = self.each(level, surroundings, (configurations.len(), PER_STOP_CHECK), stop, meeting);
         let words = meets.map(|meets| words(&meets));
         Ok(self.among_keep_outs_at(question, words, |posed, shapes, words| posed.mark(shapes, words, stop)))
     }
@@ -104,7 +104,7 @@ impl PlanningView<'_> {
         Ok((question.body.in_cells(cells_per_m)?, cells_per_m))
     }
 
-    fn each_configuration<K: Kind>(
+    fn each_configuration<K: AnswerKind>(
         &self,
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
@@ -112,7 +112,7 @@ impl PlanningView<'_> {
     ) -> Result<Option<Vec<K::Answer>>, PlanningError> {
         let (body, cells_per_m) = self.in_cells(question)?;
         let PoseQuestion { configurations, level, surroundings, .. } = *question;
-        let chunks = (configurations.len(), PER_LOOK);
+        let chunks = (configurations.len(), PER_STOP_CHECK);
         let poses = Poses { configurations, kind, configuration: Configuration::new(&body, cells_per_m) };
         Ok(self.each(level, surroundings, chunks, stop, poses))
     }
@@ -125,13 +125,13 @@ struct Poses<'a, K> {
     configuration: Configuration<'a>,
 }
 
-impl<K: Kind> Answerer for Poses<'_, K> {
+impl<K: AnswerKind> Answerer for Poses<'_, K> {
     type Answer = K::Answer;
 
     #[inline(always)]
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<K::Answer> {
+    fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<K::Answer> {
         self.configuration.place(self.configurations.poses_of(item));
-        self.kind.answer(&mut self.configuration, look)
+        self.kind.answer(&mut self.configuration, lookup)
     }
 }
 
@@ -146,24 +146,24 @@ impl Answerer for Meeting<'_> {
     type Answer = bool;
 
     #[inline(always)]
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<bool> {
+    fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<bool> {
         let mut configuration = Configuration::new(self.body, self.cells_per_m);
         configuration.place(self.configurations.poses_of(item));
-        configuration.meets(look)
+        configuration.meets(lookup)
     }
 
     #[inline(always)]
-    fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<bool>]) {
+    fn answer_all(&mut self, lookup: &mut FieldLookup<'_>, first: usize, answers: &mut [Option<bool>]) {
         let items: Vec<usize> = (0..answers.len()).filter(|&item| answers[item].is_none()).collect();
         let unanswered = Unanswered { configurations: self.configurations, first, items: &items };
         match &self.body.links[..] {
             [link] => {
                 let new = || EightPlaces::new((link, &self.body.singles), self.cells_per_m, unanswered);
-                answer_in_steps(look, items.len().div_ceil(LANES), new, answers);
+                answer_staged(lookup, items.len().div_ceil(LANES), new, answers);
             }
             _ => {
-                let new = || InTurn::new(self.body, self.cells_per_m, unanswered);
-                answer_in_steps(look, items.len(), new, answers);
+                let new = || StagedConfiguration::new(self.body, self.cells_per_m, unanswered);
+                answer_staged(lookup, items.len(), new, answers);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Answering the items of a question in rounds: what a round lacks of the field is made before the next.
 
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use crate::planning::clearance::Fields;
 use crate::planning::planner::PlanningView;
 use crate::planning::simd::{self, Work};
@@ -18,25 +18,30 @@ pub(super) trait Answerer {
     type Answer;
 
     /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
-    /// is. On the last look ([`Look::is_last`]) it always answers, unless the question is to end.
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<Self::Answer>;
+    /// is. In the last round ([`FieldLookup::is_last`]) it always answers, unless the question is to end.
+    fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<Self::Answer>;
 
     /// Answers the items from `first` on that have no answer yet.
     #[inline(always)]
-    fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<Self::Answer>]) {
+    fn answer_all(
+        &mut self,
+        lookup: &mut FieldLookup<'_>,
+        first: usize,
+        answers: &mut [Option<Self::Answer>],
+    ) {
         for (item, answer) in answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
-            if look.is_over() {
+            if lookup.is_over() {
                 return;
             }
-            *answer = self.answer(look, first + item);
+            *answer = self.answer(lookup, first + item);
         }
     }
 }
 
-/// Items that are answered between two looks at the stop signal, those of them that have no answer yet.
+/// Items that are answered between two checks of the stop signal, those of them that have no answer yet.
 struct Chunk<'a, 'l, A: Answerer> {
     answerer: &'a mut A,
-    look: &'a mut Look<'l>,
+    lookup: &'a mut FieldLookup<'l>,
     first: usize,
     answers: &'a mut [Option<A::Answer>],
 }
@@ -46,24 +51,24 @@ impl<A: Answerer> Work for Chunk<'_, '_, A> {
 
     #[inline(always)]
     fn run(self) {
-        self.answerer.answer_all(self.look, self.first, self.answers);
+        self.answerer.answer_all(self.lookup, self.first, self.answers);
     }
 }
 
 impl PlanningView<'_> {
-    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped, or where
+    /// Answers `count` items, `per_stop_check` of them at a time, between two checks of the stop signal; none once stopped, or where
     /// it may not wait and would have to.
     pub(super) fn each<A: Answerer>(
         &self,
         level: u32,
         surroundings: &Surroundings,
-        (count, per_look): (usize, usize),
+        (count, per_stop_check): (usize, usize),
         stop: StopSignal<'_>,
         mut answerer: A,
     ) -> Option<Vec<A::Answer>> {
         let mut answers: Vec<Option<A::Answer>> = Vec::with_capacity(count);
         answers.resize_with(count, || None);
-        for (chunk, answers) in answers.chunks_mut(per_look).enumerate() {
+        for (chunk, answers) in answers.chunks_mut(per_stop_check).enumerate() {
             let (mut rounds, mut full_rounds) = (0, 0);
             while answers.iter().any(Option::is_none) {
                 if stop.is_stopped() {
@@ -75,14 +80,14 @@ impl PlanningView<'_> {
                 let own = (!is_of_view).then(|| Fields::new(self.planner.map.block_levels_end() + 1, 0));
                 let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX || !is_of_view;
                 let of_view = own.as_ref().unwrap_or(&fields);
-                let mut look = Look::new(&self.view, surroundings, level, of_view, is_last, stop);
-                let (answerer, look_at) = (&mut answerer, &mut look);
-                simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
-                if look.is_stopped() {
+                let mut lookup = FieldLookup::new(&self.view, surroundings, level, of_view, is_last, stop);
+                let first = chunk * per_stop_check;
+                simd::run(Chunk { answerer: &mut answerer, lookup: &mut lookup, first, answers });
+                if lookup.is_stopped() {
                     return None;
                 }
-                *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
-                let unmade = look.into_unmade();
+                *(if lookup.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
+                let unmade = lookup.into_unmade();
                 drop(fields);
                 if !self.may_wait && !unmade.is_empty() {
                     return None;

@@ -1,8 +1,8 @@
 //! Bodies of one link: eight configurations at once.
 
-use super::field_lookup::{FoundGroup, Look};
-use super::found_spheres::Aim;
-use super::pipeline::{InSteps, Unanswered};
+use super::field_lookup::{FieldLookup, FoundGroup};
+use super::found_spheres::FoundSpheres;
+use super::pipeline::{Staged, Unanswered};
 use super::points;
 use crate::planning::body::{EightTransforms, Group, LinkInCells, LinkPose, NUMBERS_PER_POSE};
 use crate::planning::clearance::LANES;
@@ -26,7 +26,7 @@ pub(super) struct EightPlaces<'a, 'o, 'f> {
     /// look for, one sphere after the other at all places.
     near: u8,
     is_by_sphere: bool,
-    aim: Aim<'a, 'f>,
+    spheres: FoundSpheres<'a, 'f>,
 }
 
 impl<'a, 'o> EightPlaces<'a, 'o, '_> {
@@ -48,7 +48,7 @@ impl<'a, 'o> EightPlaces<'a, 'o, '_> {
             around: FoundGroup::NOTHING,
             near: 0,
             is_by_sphere: false,
-            aim: Aim::default(),
+            spheres: FoundSpheres::default(),
         }
     }
 
@@ -58,44 +58,49 @@ impl<'a, 'o> EightPlaces<'a, 'o, '_> {
 
     /// True where the link meets a voxel at one of the places; none where a part of the field is waited for.
     #[inline(always)]
-    fn meets(&mut self, look: &mut Look<'_>, lane: usize, groups: std::ops::Range<usize>) -> Option<bool> {
-        let do_spheres = self.aim.meets(look, groups)?;
-        Some(do_spheres || self.points_meet(look, lane))
+    fn meets(
+        &mut self,
+        lookup: &mut FieldLookup<'_>,
+        lane: usize,
+        groups: std::ops::Range<usize>,
+    ) -> Option<bool> {
+        let do_spheres = self.spheres.meets(lookup, groups)?;
+        Some(do_spheres || self.points_meet(lookup, lane))
     }
 
     /// True where a point of the link meets a voxel at one of the places.
     #[inline(always)]
-    fn points_meet(&self, look: &mut Look<'_>, lane: usize) -> bool {
+    fn points_meet(&self, lookup: &mut FieldLookup<'_>, lane: usize) -> bool {
         !self.link.points.is_empty() && {
             let pose = LinkPose::of(self.pose(lane));
-            points::meet(look, self.link, &pose, &self.transforms.lane(lane))
+            points::meet(lookup, self.link, &pose, &self.transforms.lane(lane))
         }
     }
 }
 
-impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
+impl<'f> Staged<'f> for EightPlaces<'_, '_, 'f> {
     #[inline(always)]
-    fn begin(&mut self, look: &mut Look<'f>, part: usize) {
+    fn begin(&mut self, lookup: &mut FieldLookup<'f>, part: usize) {
         self.first = part * LANES;
         self.count = LANES.min(self.unanswered.items.len() - self.first);
         let poses: [_; LANES] =
             std::array::from_fn(|lane| *self.pose(if lane < self.count { lane } else { 0 }));
         self.transforms.set(&poses, self.cells_per_m);
-        look.find(&self.balls, &self.balls.centers_of_each(&self.transforms), &mut self.around);
+        lookup.find(&self.balls, &self.balls.centers_of_each(&self.transforms), &mut self.around);
     }
 
     #[inline(always)]
-    fn go_on(&mut self, look: &mut Look<'f>) {
-        let judged = look.judge_found(&self.balls, &self.around);
-        self.near = (judged.meets | judged.is_open) & (u8::MAX >> (LANES - self.count));
-        self.aim.clear();
+    fn go_on(&mut self, lookup: &mut FieldLookup<'f>) {
+        let bounds = lookup.classify_found(&self.balls, &self.around);
+        self.near = (bounds.meets | bounds.is_open) & (u8::MAX >> (LANES - self.count));
+        self.spheres.clear();
         let one_by_one = self.near.count_ones() as usize * self.link.groups.len();
         self.is_by_sphere = (1..one_by_one).contains(&self.singles.len());
         if self.is_by_sphere {
             // Where the ball is clear, nothing need be made.
             self.transforms.leave(self.near);
             for single in self.singles {
-                self.aim.add_single(look, single, &self.transforms);
+                self.spheres.add_single(lookup, single, &self.transforms);
             }
             return;
         }
@@ -104,22 +109,22 @@ impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
             if self.near >> lane & 1 == 1 {
                 let cells_from_link = self.transforms.lane(lane);
                 for group in &self.link.groups {
-                    self.aim.add(look, group, &cells_from_link);
+                    self.spheres.add(lookup, group, &cells_from_link);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
+    fn end(&mut self, lookup: &mut FieldLookup<'f>, answers: &mut [Option<bool>]) {
         if self.is_by_sphere {
-            let (meets, waits) = self.aim.singles_meet(look, self.near);
+            let (meets, waits) = self.spheres.singles_meet(lookup, self.near);
             for lane in 0..self.count {
                 let item = self.unanswered.items[self.first + lane];
                 let is = |places: u8| places >> lane & 1 == 1;
                 answers[item] = match is(waits) {
                     true => None,
-                    false => Some(is(meets) || is(self.near) && self.points_meet(look, lane)),
+                    false => Some(is(meets) || is(self.near) && self.points_meet(lookup, lane)),
                 };
             }
             return;
@@ -129,7 +134,7 @@ impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
             let item = self.unanswered.items[self.first + lane];
             answers[item] = Some(false);
             if self.near >> lane & 1 == 1 {
-                answers[item] = self.meets(look, lane, begin..begin + groups);
+                answers[item] = self.meets(lookup, lane, begin..begin + groups);
                 begin += groups;
             }
         }

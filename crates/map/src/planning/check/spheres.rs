@@ -1,8 +1,8 @@
 //! Do these spheres of the map frame meet voxels?
 
-use super::answer_kind::{Clearances, FirstHits, Kind, Meets};
+use super::answer_kind::{AnswerKind, Clearances, FirstHits, Meets};
 use super::configuration::Configuration;
-use super::field_lookup::Look;
+use super::field_lookup::FieldLookup;
 use super::poses::words;
 use super::rounds::Answerer;
 use crate::planning::answers::{Clearance, Hit};
@@ -13,8 +13,8 @@ use crate::planning::planner::PlanningView;
 use crate::planning::unknown::Surroundings;
 use crate::util::StopSignal;
 
-/// Groups between two looks at the stop signal.
-const PER_LOOK: usize = 256;
+/// Groups between two checks of the stop signal.
+const PER_STOP_CHECK: usize = 256;
 
 /// Spheres of the map frame, in groups that are answered as one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +114,7 @@ impl PlanningView<'_> {
         mend(Posed::Groups(&groups.collect::<Vec<_>>()), &shapes, answers?)
     }
 
-    fn each_group<K: Kind>(
+    fn each_group<K: AnswerKind>(
         &self,
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
@@ -129,16 +129,17 @@ impl PlanningView<'_> {
             before += spheres.len();
             Ok(BodyInCells::of_link(link))
         };
-        let (mut answers, chunk) = (Vec::with_capacity(groups.sizes.len()), groups.sizes.len().min(PER_LOOK));
+        let (mut answers, chunk) =
+            (Vec::with_capacity(groups.sizes.len()), groups.sizes.len().min(PER_STOP_CHECK));
         let mut bodies = Vec::with_capacity(chunk);
         let mut groups = groups.iter().peekable();
         while groups.peek().is_some() {
             bodies.clear();
-            for group in groups.by_ref().take(PER_LOOK) {
+            for group in groups.by_ref().take(PER_STOP_CHECK) {
                 bodies.push(in_cells(group)?);
             }
             let of_bodies = Groups { bodies: &bodies, kind: &kind, cells_per_m };
-            match self.each(level, surroundings, (bodies.len(), PER_LOOK), stop, of_bodies) {
+            match self.each(level, surroundings, (bodies.len(), PER_STOP_CHECK), stop, of_bodies) {
                 Some(some) => answers.extend(some),
                 None => return Ok(None),
             }
@@ -154,14 +155,14 @@ struct Groups<'a, K> {
     cells_per_m: f64,
 }
 
-impl<K: Kind> Answerer for Groups<'_, K> {
+impl<K: AnswerKind> Answerer for Groups<'_, K> {
     type Answer = K::Answer;
 
     #[inline(always)]
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<K::Answer> {
+    fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<K::Answer> {
         let mut configuration = Configuration::new(&self.bodies[item], self.cells_per_m);
         configuration.place(&[MAP_FRAME]);
-        self.kind.answer(&mut configuration, look)
+        self.kind.answer(&mut configuration, lookup)
     }
 }
 

@@ -28,4 +28,4 @@ pub(super) use cube_search::{CubeSearch, NearestCube};
 pub(super) use eight_points::{Bounds, Centers, Found, LANES, lane_of, lanes_below_zero};
 pub use fields::FIELD_BYTES_MAX_DEFAULT;
 pub(super) use fields::{FieldBlockKey, Fields};
-pub(super) use small_balls::Nearby;
+pub(super) use small_balls::BallState;

@@ -75,7 +75,7 @@ impl Along {
 
 /// What the cells of the field say of a ball.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::planning) enum Nearby {
+pub(in crate::planning) enum BallState {
     /// It meets an occupied one.
     Meets,
     /// It meets none.
@@ -86,11 +86,11 @@ pub(in crate::planning) enum Nearby {
     Unmade([i32; 3]),
 }
 
-/// Whether a ball meets an occupied cell, as `cubes` defines it.
+/// Whether a ball meets an occupied cell, as `cube_search` defines it.
 #[inline(always)]
-pub(in crate::planning) fn ask(field: &FieldLevel, center: [f64; 3], radius: f64) -> Nearby {
+pub(in crate::planning) fn ask(field: &FieldLevel, center: [f64; 3], radius: f64) -> BallState {
     if radius > RADIUS_CELLS_MAX || center.iter().any(|c| c.abs() >= COORDINATE_MAX) {
-        return Nearby::Unknown;
+        return BallState::Unknown;
     }
     let squared_max = radius * radius;
     let [xs, ys, zs] =
@@ -104,14 +104,14 @@ pub(in crate::planning) fn ask(field: &FieldLevel, center: [f64; 3], radius: f64
                 }
                 let gaps = [&xs.squared[line_x], &ys.squared[line_y], &zs.squared[line_z]];
                 match lines.line([x, y, z]) {
-                    None => return Nearby::Unmade([x, y, z]),
-                    Some(line) if line_meets(line, gaps, squared_max) => return Nearby::Meets,
+                    None => return BallState::Unmade([x, y, z]),
+                    Some(line) if line_meets(line, gaps, squared_max) => return BallState::Meets,
                     Some(_) => {}
                 }
             }
         }
     }
-    Nearby::IsFree
+    BallState::IsFree
 }
 
 /// True where a cell of the line is occupied and the squared gaps to it are not too large.

@@ -9,8 +9,8 @@ use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;
 use crate::voxel::Cluster;
 
-/// Points that are searched between two looks at the stop signal: at worst some milliseconds.
-const POINTS_PER_LOOK: usize = 64;
+/// Points that are searched between two checks of the stop signal: at worst some milliseconds.
+const POINTS_PER_STOP_CHECK: usize = 64;
 
 /// The nearest occupied voxel of each point, within a radius.
 ///
@@ -37,7 +37,7 @@ pub fn find_nearest(
     let nothing = Cluster::default();
     let mut search = Search::new(view.tier_view(level), &nothing, radius_m, to);
     let mut nearest = NearestVoxels::of_capacity(points.len());
-    for &point in stop.paced(points, POINTS_PER_LOOK) {
+    for &point in stop.paced(points, POINTS_PER_STOP_CHECK) {
         nearest.push(search.nearest(point));
     }
     if let Some(shapes) = Shapes::of(view) {

@@ -6,7 +6,7 @@ use super::request::MeasuredTo;
 use super::seeker::Seeker;
 use crate::geometry::Point;
 use crate::map::TierView;
-use crate::planning::recent_clusters::Remembered;
+use crate::planning::recent_clusters::RecentClusters;
 use crate::util::bits::for_each_bit;
 use crate::voxel::{BLOCK_SIDE, BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, Cluster, VoxelKey};
 
@@ -15,7 +15,7 @@ const BLOCKS: usize = 1 << CLUSTER_LEVELS;
 
 /// A search within one radius. All lengths are in cells, see [`TierView`].
 pub(super) struct Search<'a> {
-    clusters: Remembered<'a>,
+    clusters: RecentClusters<'a>,
     radius: f64,
     /// How far inside its cube's faces a voxel is measured to: 0, or half its side.
     inset: f64,
@@ -29,7 +29,7 @@ impl<'a> Search<'a> {
             MeasuredTo::Cubes => 0.0,
             MeasuredTo::Centers => side / 2.0,
         };
-        Self { radius: radius_m / view.cell_m(), inset, clusters: Remembered::new(view, nothing) }
+        Self { radius: radius_m / view.cell_m(), inset, clusters: RecentClusters::new(view, nothing) }
     }
 
     /// The nearest voxel within the radius of `point`.

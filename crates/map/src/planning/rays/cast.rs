@@ -1,7 +1,7 @@
 //! Casting rays: through occupied voxels or through all that is not free, up to the first keep-out.
 
 use super::hits::RayHits;
-use super::interleaved::Turns;
+use super::interleaved::InterleavedRays;
 use super::rays_in_cells::Request;
 use super::request::{RayError, Rays};
 use super::space::Space;
@@ -36,7 +36,7 @@ pub fn cast_rays(
 ) -> Result<RayHits, RayError> {
     let nothing = Cluster::default();
     cast(view, rays, level, stop, |tier, request, hits| match view.cell_bounds(level) {
-        Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(hits, stop),
+        Some(bounds) => InterleavedRays::new(Space::new(tier, bounds, &nothing), request).walk(hits, stop),
         None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ())),
     })
 }

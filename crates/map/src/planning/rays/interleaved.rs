@@ -1,4 +1,4 @@
-//! Rays that take turns: while one waits for memory or for a sum, others go on.
+//! Interleaved rays: while one waits for memory or for a sum, others go on.
 #![expect(unsafe_code, reason = "instructions that not every machine has")]
 
 use super::hits::RayHits;
@@ -12,18 +12,18 @@ use crate::util::cpu::Avx2;
 /// Rays under way at once.
 const AT_ONCE: usize = 4;
 
-/// Rounds of turns between two looks at the stop signal: about a millisecond.
-const ROUNDS_PER_LOOK: usize = 16_384;
+/// Rounds between two checks of the stop signal: about a millisecond.
+const ROUNDS_PER_STOP_CHECK: usize = 16_384;
 
 /// All rays of a request, some of them under way.
-pub(super) struct Turns<'a> {
+pub(super) struct InterleavedRays<'a> {
     space: Space<'a>,
     request: Request<'a>,
     /// The first ray that has not begun.
     next: usize,
 }
 
-impl<'a> Turns<'a> {
+impl<'a> InterleavedRays<'a> {
     /// The rays of `request` in `space`, none of which has begun.
     pub(super) fn new(space: Space<'a>, request: Request<'a>) -> Self {
         Self { space, request, next: 0 }
@@ -43,7 +43,7 @@ impl<'a> Turns<'a> {
         Ok(())
     }
 
-    /// Lets each ray take so many turns.
+    /// Lets each ray take so many steps: [`ROUNDS_PER_STOP_CHECK`].
     fn some_rounds(&mut self, walks: &mut Vec<Walk>, hits: &mut RayHits) -> Result<(), RayError> {
         #[cfg(target_arch = "x86_64")]
         if let Some(cpu) = Avx2::detect() {
@@ -52,7 +52,7 @@ impl<'a> Turns<'a> {
         self.rounds(walks, hits)
     }
 
-    /// [`Turns::some_rounds`] with all axes of a ray in one register. The sums are the same, in the same order.
+    /// [`InterleavedRays::some_rounds`] with all axes of a ray in one register. The sums are the same, in the same order.
     #[cfg(target_arch = "x86_64")]
     fn some_rounds_avx2(
         &mut self,
@@ -62,11 +62,11 @@ impl<'a> Turns<'a> {
     ) -> Result<(), RayError> {
         #[target_feature(enable = "avx2,popcnt")]
         fn with_avx2(
-            turns: &mut Turns<'_>,
+            rays: &mut InterleavedRays<'_>,
             walks: &mut Vec<Walk>,
             hits: &mut RayHits,
         ) -> Result<(), RayError> {
-            turns.rounds(walks, hits)
+            rays.rounds(walks, hits)
         }
         // SAFETY: the token says that the CPU has the features.
         unsafe { with_avx2(self, walks, hits) }
@@ -74,15 +74,15 @@ impl<'a> Turns<'a> {
 
     #[inline(always)]
     fn rounds(&mut self, walks: &mut Vec<Walk>, hits: &mut RayHits) -> Result<(), RayError> {
-        for _ in 0..ROUNDS_PER_LOOK {
+        for _ in 0..ROUNDS_PER_STOP_CHECK {
             if walks.is_empty() {
                 break;
             }
-            let mut turn = 0;
-            while let Some(walk) = walks.get_mut(turn) {
+            let mut at = 0;
+            while let Some(walk) = walks.get_mut(at) {
                 match self.space.step(walk) {
                     Step::Further => {
-                        turn += 1;
+                        at += 1;
                         continue;
                     }
                     Step::Hit(distance_m, voxel) => hits.set(walk.number, distance_m, voxel),
@@ -90,7 +90,7 @@ impl<'a> Turns<'a> {
                 }
                 match self.begin()? {
                     Some(begun) => *walk = begun,
-                    None => drop(walks.swap_remove(turn)),
+                    None => drop(walks.swap_remove(at)),
                 }
             }
         }

@@ -6,10 +6,10 @@ use crate::map::{Lookup, MapView};
 use crate::util::{Keyword, StopSignal};
 use crate::voxel::VoxelKey;
 
-/// Points between two looks at the stop signal. A multiple of the bits in a word.
-const POINTS_PER_LOOK: usize = 4096;
-/// Points that viewpoints are asked of between two looks at it: where thousands looked, one takes up to a millisecond.
-const ASKED_PER_LOOK: usize = 16;
+/// Points between two checks of the stop signal. A multiple of the bits in a word.
+const POINTS_PER_STOP_CHECK: usize = 4096;
+/// Points that viewpoints are asked of between two checks of it: where thousands looked, one takes up to a millisecond.
+const ASKED_PER_STOP_CHECK: usize = 16;
 
 /// What is known of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -109,15 +109,22 @@ pub fn classify_points(
     // Points that come one after the other are often in one voxel.
     let mut last: Option<(VoxelKey, bool)> = None;
     let mut asked = 0;
-    let words =
-        states.occupied.chunks_mut(POINTS_PER_LOOK / 64).zip(states.free.chunks_mut(POINTS_PER_LOOK / 64));
+    let words = states
+        .occupied
+        .chunks_mut(POINTS_PER_STOP_CHECK / 64)
+        .zip(states.free.chunks_mut(POINTS_PER_STOP_CHECK / 64));
     'all: for (looked_up, (some, (occupied, free))) in
-        stop.paced(points.chunks(POINTS_PER_LOOK).zip(words).enumerate(), 1)
+        stop.paced(points.chunks(POINTS_PER_STOP_CHECK).zip(words).enumerate(), 1)
     {
         if !view.query(some, &from_map, level, Lookup::Exact, occupied) {
             let at = some.iter().position(|&point| from_map.index(point).is_none()).unwrap_or_default();
             let (min_m, end_m) = view.lattice().range_m();
-            return Err(OutOfRange { at: looked_up * POINTS_PER_LOOK + at, point: some[at], min_m, end_m });
+            return Err(OutOfRange {
+                at: looked_up * POINTS_PER_STOP_CHECK + at,
+                point: some[at],
+                min_m,
+                end_m,
+            });
         }
         if let Some(keep_outs) = view.keep_outs() {
             keep_outs.mark(some, &Pose::identity(), occupied, stop);
@@ -125,7 +132,7 @@ pub fn classify_points(
         for (i, &point) in some.iter().enumerate().filter(|(i, _)| occupied[i / 64] >> (i % 64) & 1 == 0) {
             let Some(voxel) = from_map.key(point).map(|finest| finest.ancestor(level)) else { continue };
             asked += 1;
-            if asked % ASKED_PER_LOOK == 0 && stop.is_stopped() {
+            if asked % ASKED_PER_STOP_CHECK == 0 && stop.is_stopped() {
                 break 'all;
             }
             let is_free = match last {
