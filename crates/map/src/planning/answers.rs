@@ -17,8 +17,8 @@ pub fn clearance_max_m(lattice: &Lattice, level: u32) -> f32 {
 /// What something meets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Met {
-    /// A voxel: for a sphere the nearest to its center, of several the one with the smallest key; for a point without padding
-    /// the one that it falls in.
+    /// A voxel: for a sphere the nearest to its center, of several the one with the smallest key; for a point without
+    /// padding the one that it falls in.
     Voxel(VoxelKey),
     /// A keep-out, by its name: the nearest to the center, of several as near the first by name.
     KeepOut(KeepOutName),

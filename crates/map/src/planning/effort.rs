@@ -4,8 +4,9 @@ use std::cell::Cell;
 
 use crate::util::StopSignal;
 
-/// Units of work between two checks of the stop signal. A unit takes some ten nanoseconds: a look-up of eight places in the field, a voxel or a
-/// block that is considered, a test of a place and the box around a keep-out, or a corner of a keep-out.
+/// Units of work between two checks of the stop signal. A unit takes some ten nanoseconds: a look-up of eight places in
+/// the field, a voxel or a block that is considered, a test of a place and the box around a keep-out, or a corner of a
+/// keep-out.
 pub(super) const WORK_PER_STOP_CHECK: u32 = 8192;
 
 /// The work of a question, counted so that the stop signal is checked in proportion to it, whatever it asks and however

@@ -17,8 +17,8 @@ const MADE_PER_STOP_CHECK: usize = 32;
 
 /// Answers planners' questions about a map.
 ///
-/// It keeps distance fields beside the map: made where they are asked for, renewed where the map changed, bounded in memory.
-/// A map without a planner costs nothing for it. Dropping the planner gives the memory back.
+/// It keeps distance fields beside the map: made where they are asked for, renewed where the map changed, bounded in
+/// memory. A map without a planner costs nothing for it. Dropping the planner gives the memory back.
 #[derive(Debug)]
 pub struct Planner {
     pub(super) map: Arc<MultiResolutionMap>,
@@ -41,8 +41,8 @@ impl Planner {
         Self::with_field_bytes(map, FIELD_BYTES_MAX_DEFAULT)
     }
 
-    /// A planner of `map` whose fields hold at most `field_bytes_max` bytes, but for what a question needs at once. Less
-    /// is slower, and as exact.
+    /// A planner of `map` whose fields hold at most `field_bytes_max` bytes, but for what a question needs at once.
+    /// Less is slower, and as exact.
     pub fn with_field_bytes(map: Arc<MultiResolutionMap>, field_bytes_max: usize) -> Self {
         let follower = map.follow_blocks();
         let fields = Fields::new(map.block_levels_end() + 1, field_bytes_max);
@@ -67,9 +67,9 @@ impl Planner {
         PlanningView { planner: self, view, may_wait: true, _changes_wait: changes_wait }
     }
 
-    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be mended
-    /// after a change. A question that needs a part of the fields which is not made yet then has no answer, as if it had
-    /// been stopped.
+    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be
+    /// mended after a change. A question that needs a part of the fields which is not made yet then has no answer, as
+    /// if it had been stopped.
     pub fn try_view(&self) -> Option<PlanningView<'_>> {
         let changes_wait = self.map.try_long_read()?;
         let view = self.map.try_view()?;

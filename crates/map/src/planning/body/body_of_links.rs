@@ -20,7 +20,8 @@ impl Body {
     /// A body of `links`.
     ///
     /// # Errors
-    /// Without a link, without a sphere or point in any of them, or when a number is not finite or out of range; the error names it.
+    /// Without a link, without a sphere or point in any of them, or when a number is not finite or out of range; the
+    /// error names it.
     pub fn new(links: Vec<Link>) -> Result<Self, PlanningError> {
         if links.is_empty() {
             return Err(PlanningError::NoLinks);

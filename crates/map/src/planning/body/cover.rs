@@ -38,8 +38,8 @@ pub enum CoverError {
 pub fn cover_box(size_m: [f32; 3], margin_m: f32) -> Result<Vec<Sphere>, CoverError> {
     check_margin(margin_m)?;
     size_m.iter().try_for_each(|side| check_size("size_m", *side))?;
-    // A cell of half sides h is within a sphere of radius |h|, which reaches |h| - h_i beyond it along axis i: not more than
-    // the diagonal of its two other half sides.
+    // A cell of half sides h is within a sphere of radius |h|, which reaches |h| - h_i beyond it along axis i: not more
+    // than the diagonal of its two other half sides.
     let half_max_m = f64::from(margin_m) / std::f64::consts::SQRT_2;
     let cells = size_m.map(|side| (f64::from(side) / (2.0 * half_max_m)).ceil().max(1.0));
     check_count(cells.iter().product(), margin_m)?;
@@ -55,8 +55,8 @@ pub fn cover_box(size_m: [f32; 3], margin_m: f32) -> Result<Vec<Sphere>, CoverEr
     Ok((0..columns * rows * layers).map(|number| sphere(cell(number))).collect())
 }
 
-/// Spheres that cover a capsule, all points within `radius_m` of the line from `from_m` to `to_m`, and are larger than it by
-/// `margin_m` at most.
+/// Spheres that cover a capsule, all points within `radius_m` of the line from `from_m` to `to_m`, and are larger than
+/// it by `margin_m` at most.
 ///
 /// # Errors
 /// When a number is out of range, or the cover would have more than [`COVER_SPHERES_MAX`] spheres.

@@ -44,7 +44,8 @@ pub(in crate::planning) struct LinkInCells {
     pub(in crate::planning) groups: Vec<Group>,
     /// How many there are.
     pub(in crate::planning) spheres: usize,
-    /// Points without padding, in clumps of [`POINTS_PER_CLUMP`] near each other, and the number of each among the link's.
+    /// Points without padding, in clumps of [`POINTS_PER_CLUMP`] near each other, and the number of each among the
+    /// link's.
     pub(in crate::planning) points: Vec<Point>,
     pub(in crate::planning) numbers: Vec<usize>,
     /// The balls around the clumps, eight at a time.
@@ -186,7 +187,8 @@ impl LinkInCells {
     }
 }
 
-/// Points in an order in which neighbors follow each other, the number of each, and balls around some of them at a time.
+/// Points in an order in which neighbors follow each other, the number of each, and balls around some of them at a
+/// time.
 fn clumps(points_m: &[[f64; 3]], cells_per_m: f64) -> (Vec<Point>, Vec<usize>, Vec<Group>) {
     let mut numbers: Vec<usize> = (0..points_m.len()).collect();
     split(points_m, &mut numbers);

@@ -17,8 +17,8 @@ pub struct Sphere {
 
 /// A rigid part of a body, in a frame of its own.
 ///
-/// A sphere meets a voxel where the closed ball and the closed cube share a point. A point without padding meets the voxel
-/// that it falls in; with padding it is a sphere of that radius.
+/// A sphere meets a voxel where the closed ball and the closed cube share a point. A point without padding meets the
+/// voxel that it falls in; with padding it is a sphere of that radius.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Link {
     /// Its spheres.

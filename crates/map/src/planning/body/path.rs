@@ -1,5 +1,5 @@
-//! How a link moves between two poses: its translation along a line, its rotation along the shorter arc, both evenly. Of the
-//! two arcs of half a turn the signs of the quaternions decide.
+//! How a link moves between two poses: its translation along a line, its rotation along the shorter arc, both evenly.
+//! Of the two arcs of half a turn the signs of the quaternions decide.
 
 use super::placement::LinkPose;
 

@@ -37,7 +37,8 @@ impl Body {
         })
     }
 
-    /// How far a center of `link` strays at most from the line between its places in a configuration and the next, meters.
+    /// How far a center of `link` strays at most from the line between its places in a configuration and the next,
+    /// meters.
     ///
     /// # Panics
     /// When there are no such configurations.
@@ -46,8 +47,8 @@ impl Body {
         let motion = LinkMotion::new(&pose(from), &pose(from + 1));
         let extent_m = |center: [f64; 3]| center.iter().map(|c| c * c).sum::<f64>().sqrt();
         let far_m = self.links()[link].padded().map(|(center, _)| extent_m(center)).fold(0.0, f64::max);
-        // After a share s of the turn by a, a center is s a r from where it would be without, and (1 - s) a r from where it
-        // would be at the end: 2 s (1 - s) a r from the line at most.
+        // After a share s of the turn by a, a center is s a r from where it would be without, and (1 - s) a r from
+        // where it would be at the end: 2 s (1 - s) a r from the line at most.
         (motion.length_m(far_m) - motion.length_m(0.0)) / 2.0
     }
 }

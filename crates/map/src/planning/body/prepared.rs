@@ -7,7 +7,8 @@ use super::in_cells::BodyInCells;
 use super::parts::Link;
 use crate::planning::error::PlanningError;
 
-/// Sizes of cells for which a body is kept: those of as many levels, of maps of the same resolution. It is made anew for others.
+/// Sizes of cells for which a body is kept: those of as many levels, of maps of the same resolution. It is made anew
+/// for others.
 const KEPT: usize = 4;
 
 /// One body, for each size of cells that it was asked about with.

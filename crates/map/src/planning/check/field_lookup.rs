@@ -30,7 +30,8 @@ pub(super) struct FieldLookup<'a> {
     unmade: Vec<FieldBlockKey>,
     /// True once so many are to be made that the rest has to wait.
     is_full: bool,
-    /// True in the last round: blocks that are not made are not waited for, the exact search of the voxels answers instead.
+    /// True in the last round: blocks that are not made are not waited for, the exact search of the voxels answers
+    /// instead.
     pub(super) is_last: bool,
     effort: Effort<'a>,
 }
@@ -86,7 +87,8 @@ impl<'a> FieldLookup<'a> {
         is_last: bool,
         stop: StopSignal<'a>,
     ) -> Self {
-        // What is free at a level does not tell what is at a finer one: fields of coarser levels say nothing of this one then.
+        // What is free at a level does not tell what is at a finer one: fields of coarser levels say nothing of this
+        // one then.
         let levels_above =
             if surroundings.unknown_counts() { 0 } else { view.map().block_levels_end() - level };
         let (unmade, effort) = (Vec::new(), Effort::until(stop));
@@ -241,8 +243,8 @@ impl<'a> FieldLookup<'a> {
         CubeSearch::new(view, surroundings, (*level, field), center, effort)
     }
 
-    /// A lower bound of the distance from a point to the nearest voxel, cells, by fields of ever coarser levels until one
-    /// knows or the bound is at least `enough`.
+    /// A lower bound of the distance from a point to the nearest voxel, cells, by fields of ever coarser levels until
+    /// one knows or the bound is at least `enough`.
     pub(super) fn far_lower_bound(&mut self, center: [f64; 3], enough: f64) -> f64 {
         let centers = center.map(|c| [c; LANES]);
         let mut best = 0.0f64;

@@ -103,8 +103,8 @@ impl<'a, 'f> FoundSpheres<'a, 'f> {
         self.count += 1;
     }
 
-    /// Of spheres at eight places, added one by one: those of `places` where a sphere meets a voxel, and those where a part of
-    /// the field is waited for.
+    /// Of spheres at eight places, added one by one: those of `places` where a sphere meets a voxel, and those where a
+    /// part of the field is waited for.
     #[inline(always)]
     pub(super) fn singles_meet(&mut self, lookup: &mut FieldLookup<'_>, places: u8) -> (u8, u8) {
         let (mut meets, mut unmade) = (0, 0);

@@ -10,8 +10,8 @@ use crate::voxel::VoxelKey;
 /// Distance, in cells, beyond which the field of the level itself says nothing.
 const FIELD_CELLS: f64 = 7.0;
 
-/// The first sphere of a link that meets a voxel, and the nearest voxel to its center. While a part of the field is waited
-/// for, which `unmade` then says, none.
+/// The first sphere of a link that meets a voxel, and the nearest voxel to its center. While a part of the field is
+/// waited for, which `unmade` then says, none.
 pub(super) fn first_sphere(
     lookup: &mut FieldLookup<'_>,
     link: &LinkInCells,
@@ -108,8 +108,8 @@ pub(super) enum LinkState {
     Waits,
 }
 
-/// What is known of the link at a pose: by the ball around it, unless that is not to be asked (`is_near`), and by its spheres
-/// where that is not clear. `open` is a place for spheres.
+/// What is known of the link at a pose: by the ball around it, unless that is not to be asked (`is_near`), and by its
+/// spheres where that is not clear. `open` is a place for spheres.
 #[inline(always)]
 pub(super) fn state(
     lookup: &mut FieldLookup<'_>,

@@ -1,10 +1,10 @@
 //! Can a body move along these configurations?
 //!
-//! Between two configurations a link's translation goes along a line and its rotation along the shorter arc; of two that are
-//! equally long, half a turn each, the signs of the quaternions decide. A motion is
-//! checked in even steps, so that no point of the body moves further than a step. Steps are skipped by clearance: a link
-//! that is clear by d cannot meet a voxel before one of its spheres' centers has moved by d. So the answer is that of all
-//! steps. Keep-outs, which may be thinner than any step, are met along the whole way.
+//! Between two configurations a link's translation goes along a line and its rotation along the shorter arc; of two
+//! that are equally long, half a turn each, the signs of the quaternions decide. A motion is checked in even steps, so
+//! that no point of the body moves further than a step. Steps are skipped by clearance: a link that is clear by d
+//! cannot meet a voxel before one of its spheres' centers has moved by d. So the answer is that of all steps.
+//! Keep-outs, which may be thinner than any step, are met along the whole way.
 
 use super::answer_kind::Clearances;
 use super::field_lookup::FieldLookup;
@@ -41,8 +41,8 @@ pub struct MotionQuestion<'a> {
     pub configurations: Configurations<'a>,
     /// How many configurations each motion has: two or more.
     pub lengths: &'a [u32],
-    /// How far a point of the body moves in a step at most, meters; half a voxel of the level without. Keep-outs are met along
-    /// the whole way, to within 1 mm, half a voxel of level 0, or the step, whichever is least.
+    /// How far a point of the body moves in a step at most, meters; half a voxel of the level without. Keep-outs are
+    /// met along the whole way, to within 1 mm, half a voxel of level 0, or the step, whichever is least.
     pub step_m: Option<f32>,
     /// Up to where the least clearance of each motion is told, meters; it is not told without.
     pub clearance_max_m: Option<f32>,
@@ -63,7 +63,8 @@ pub struct MotionAnswer {
     pub clearance_m: Option<f32>,
 }
 
-/// Bytes of memory in which so many `motions` of a body of `links` links, with so many `configurations` in all, are prepared.
+/// Bytes of memory in which so many `motions` of a body of `links` links, with so many `configurations` in all, are
+/// prepared.
 pub fn prepared_bytes(motions: usize, configurations: usize, links: usize) -> usize {
     // A list that grows takes up to three times what is in it, and one that begins has room for four.
     let (per_motion, per_segment) = (3 * size_of::<BodyMotion<'_>>(), 3 * size_of::<Segment>());
@@ -321,7 +322,8 @@ impl BodyMotion<'_> {
     }
 }
 
-/// Steps to the next one at which what is `clear` cells away can be reached, where each step goes `per_step` cells at most.
+/// Steps to the next one at which what is `clear` cells away can be reached, where each step goes `per_step` cells at
+/// most.
 #[inline(always)]
 fn steps_without(clear: f64, per_step: f64) -> u64 {
     let steps = (clear - ROUNDING_CELLS) / per_step;

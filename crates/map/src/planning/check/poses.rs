@@ -34,8 +34,8 @@ pub struct PoseQuestion<'a> {
 }
 
 impl PlanningView<'_> {
-    /// Says of each configuration whether the body meets a voxel: configuration i is bit i % 64 of word i / 64. None once
-    /// stopped.
+    /// Says of each configuration whether the body meets a voxel: configuration i is bit i % 64 of word i / 64. None
+    /// once stopped.
     ///
     /// # Errors
     /// For a level that the map has not, and spheres that are too large for the level.
@@ -68,7 +68,8 @@ impl PlanningView<'_> {
     /// How much room the body has in each configuration, up to `most_m` meters. None once stopped.
     ///
     /// # Errors
-    /// As for [`PlanningView::bodies_meet`], and when `most_m` is more than [`CLEARANCE_CELLS_MAX`](crate::planning::CLEARANCE_CELLS_MAX) voxels.
+    /// As for [`PlanningView::bodies_meet`], and when `most_m` is more than
+    /// [`CLEARANCE_CELLS_MAX`](crate::planning::CLEARANCE_CELLS_MAX) voxels.
     pub fn clearances(
         &self,
         question: &PoseQuestion<'_>,

@@ -17,8 +17,8 @@ pub(super) trait Answerer {
     /// The answer of an item.
     type Answer;
 
-    /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
-    /// is. In the last round ([`FieldLookup::is_last`]) it always answers, unless the question is to end.
+    /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when
+    /// that is. In the last round ([`FieldLookup::is_last`]) it always answers, unless the question is to end.
     fn answer(&mut self, lookup: &mut FieldLookup<'_>, item: usize) -> Option<Self::Answer>;
 
     /// Answers the items from `first` on that have no answer yet.
@@ -56,8 +56,8 @@ impl<A: Answerer> Work for Chunk<'_, '_, A> {
 }
 
 impl PlanningView<'_> {
-    /// Answers `count` items, `per_stop_check` of them at a time, between two checks of the stop signal; none once stopped, or where
-    /// it may not wait and would have to.
+    /// Answers `count` items, `per_stop_check` of them at a time, between two checks of the stop signal; none once
+    /// stopped, or where it may not wait and would have to.
     pub(super) fn each<A: Answerer>(
         &self,
         level: u32,

@@ -22,8 +22,8 @@ pub(super) struct EightPlaces<'a, 'o, 'f> {
     count: usize,
     transforms: EightTransforms,
     around: FoundGroup<'f>,
-    /// The places where the ball is not clear, with the spheres there: one place after the other, or, where that is less to
-    /// look for, one sphere after the other at all places.
+    /// The places where the ball is not clear, with the spheres there: one place after the other, or, where that is
+    /// less to look for, one sphere after the other at all places.
     near: u8,
     is_by_sphere: bool,
     spheres: FoundSpheres<'a, 'f>,

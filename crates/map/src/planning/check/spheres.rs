@@ -59,7 +59,8 @@ impl<'a> SphereGroups<'a> {
 }
 
 impl PlanningView<'_> {
-    /// Says of each group whether a sphere of it meets a voxel: group i is bit i % 64 of word i / 64. None once stopped.
+    /// Says of each group whether a sphere of it meets a voxel: group i is bit i % 64 of word i / 64. None once
+    /// stopped.
     ///
     /// # Errors
     /// For a level that the map has not, a padding out of range, and spheres that are too large for the level.

@@ -1,8 +1,8 @@
 //! When a ball meets a voxel: the one definition, and the exact search for the nearest voxel.
 //!
-//! Everything is counted in cells of the level that is asked, in f64. The cube of voxel i is \[i, i + 1\], closed; a ball of
-//! center c and radius r is closed as well. They meet where the squared distance from c to the cube,
-//! `(x * x + y * y) + z * z` of the gaps along the axes, is at most `r * r`.
+//! Everything is counted in cells of the level that is asked, in f64. The cube of voxel i is \[i, i + 1\], closed; a
+//! ball of center c and radius r is closed as well. They meet where the squared distance from c to the cube, `(x * x +
+//! y * y) + z * z` of the gaps along the axes, is at most `r * r`.
 
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey};

@@ -16,8 +16,8 @@ pub(super) const COORDINATE_MAX: f64 = ((1 << 20) - 64) as f64;
 /// Eight points in cells of a level, axis by axis.
 pub(in crate::planning) type Centers = [[f64; LANES]; 3];
 
-/// Bounds of the distances from eight points to the nearest voxel, in cells of the field; zero and infinity where nothing
-/// is known.
+/// Bounds of the distances from eight points to the nearest voxel, in cells of the field; zero and infinity where
+/// nothing is known.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::planning) struct Bounds {
     pub(in crate::planning) lower: [f32; LANES],
@@ -25,8 +25,8 @@ pub(in crate::planning) struct Bounds {
     pub(in crate::planning) upper: [f32; LANES],
 }
 
-/// The cells that eight points fall in, or neighbors where they are near a border; and how far from the cells' middles they
-/// are, rounded up.
+/// The cells that eight points fall in, or neighbors where they are near a border; and how far from the cells' middles
+/// they are, rounded up.
 struct Cells {
     index: [[i32; LANES]; 3],
     off_middle: [f32; LANES],
@@ -82,8 +82,8 @@ impl Found<'_> {
 
 /// Finds eight points in the field of a level whose cells are 1 / `scale` of those in which the points are counted.
 ///
-/// What [`Found::bounds`] reads is fetched. Into `found`, where it stays: lane by lane written and copied as a whole, it
-/// would be waited for.
+/// What [`Found::bounds`] reads is fetched. Into `found`, where it stays: lane by lane written and copied as a whole,
+/// it would be waited for.
 #[inline(always)]
 pub(in crate::planning) fn find<'f>(
     field: &'f FieldLevel,

@@ -1,5 +1,5 @@
-//! Balls against the occupied cells of the field, which are its zeros: exact, and mostly in lines of memory that the field's
-//! bounds were just read from.
+//! Balls against the occupied cells of the field, which are its zeros: exact, and mostly in lines of memory that the
+//! field's bounds were just read from.
 
 use super::block::LINE_BYTES;
 use super::cluster::FieldCluster;
@@ -39,8 +39,8 @@ impl<'a> LineReader<'a> {
     }
 }
 
-/// The lines along an axis that a ball may meet: the first cell of them, how many, the squared gap to each cell, and the
-/// smallest to one of each line.
+/// The lines along an axis that a ball may meet: the first cell of them, how many, the squared gap to each cell, and
+/// the smallest to one of each line.
 struct Along {
     first: i32,
     count: usize,

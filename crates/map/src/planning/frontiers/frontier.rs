@@ -30,7 +30,8 @@ pub struct FrontierView {
     pub elevation_rad: f64,
 }
 
-/// The frontiers of a box, the largest first; of those as large, the one whose first voxel has the smaller z, then y, then x.
+/// The frontiers of a box, the largest first; of those as large, the one whose first voxel has the smaller z, then y,
+/// then x.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Frontiers {
     /// Those that are told.

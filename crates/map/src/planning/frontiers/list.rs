@@ -12,15 +12,16 @@ use crate::util::StopSignal;
 /// Most voxels of a box, whatever the request says: their places and those around are numbers of 32 bits.
 const CELLS_MAX: usize = u32::MAX as usize / 32;
 
-/// The frontiers of a box: voxels of `level` that are free and beside which, along an axis, one is unknown, in the box or just
-/// outside. Voxels of a frontier touch each other, at least at corners.
+/// The frontiers of a box: voxels of `level` that are free and beside which, along an axis, one is unknown, in the box
+/// or just outside. Voxels of a frontier touch each other, at least at corners.
 ///
-/// Free is what [`classify_points`](crate::planning::classify_points) says of a voxel's center, so that the view needs viewpoints. Each frontier
-/// is told with a place from which a line to its middle runs through free voxels alone: as far away as is asked for, or else no
-/// nearer to what ends the line than to the frontier, and rather on the side where nothing is unknown.
+/// Free is what [`classify_points`](crate::planning::classify_points) says of a voxel's center, so that the view needs
+/// viewpoints. Each frontier is told with a place from which a line to its middle runs through free voxels alone: as
+/// far away as is asked for, or else no nearer to what ends the line than to the frontier, and rather on the side where
+/// nothing is unknown.
 ///
-/// The view must cover the whole map. Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Once stopped, some
-/// are missing.
+/// The view must cover the whole map. Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Once stopped,
+/// some are missing.
 ///
 /// # Errors
 /// For corners that make no box, a box of too many voxels, and a distance out of range.

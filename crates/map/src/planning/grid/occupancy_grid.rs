@@ -8,14 +8,15 @@ pub struct Grid {
     pub cell_m: f64,
     /// Corner of the grid: smallest x and y, meters.
     pub origin_m: [f64; 2],
-    /// Number of cells along x and y; none where an area was asked for that is as large as what is there, and nothing is.
+    /// Number of cells along x and y; none where an area was asked for that is as large as what is there, and nothing
+    /// is.
     pub size: [usize; 2],
     /// Whether cell i has a voxel or a keep-out: bit i % 64 of `occupied[i / 64]`.
     pub occupied: Vec<u64>,
     /// Height of the top of the highest voxel of each cell that lies in the band, meters; NaN for a cell without one.
     pub tops_m: Vec<f32>,
-    /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was not, the
-    /// grid does not tell what was seen.
+    /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was
+    /// not, the grid does not tell what was seen.
     pub free: Option<Vec<u64>>,
 }
 

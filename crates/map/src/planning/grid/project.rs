@@ -11,18 +11,19 @@ use crate::util::StopSignal;
 
 /// Which cells of a grid have occupied voxels of a level in a band of height, and how high these reach.
 ///
-/// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each voxel
-/// lies in one cell. Voxels of the band are those whose centers lie in it, as those of a [`Region`] are.
+/// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each
+/// voxel lies in one cell. Voxels of the band are those whose centers lie in it, as those of a [`Region`] are.
 ///
-/// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied too; they
-/// have no top, and make no grid larger that is as large as what is there.
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
+/// too; they have no top, and make no grid larger that is as large as what is there.
 ///
-/// Where that is asked for, a cell is free that is not occupied and in which each column of voxels has a free one in the band: one that
-/// a scan saw through, where the view has viewpoints ([`MapView::with_viewpoints`]). Whoever drives there drove or looked through the
-/// column at some height; what is above or below of it may be unknown. Cells that are neither are unknown.
+/// Where that is asked for, a cell is free that is not occupied and in which each column of voxels has a free one in
+/// the band: one that a scan saw through, where the view has viewpoints ([`MapView::with_viewpoints`]). Whoever drives
+/// there drove or looked through the column at some height; what is above or below of it may be unknown. Cells that are
+/// neither are unknown.
 ///
-/// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a cell, and 4 more where cells are told apart.
-/// The view must cover the whole map. Once stopped, the grid lacks voxels.
+/// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a
+/// cell, and 4 more where cells are told apart. The view must cover the whole map. Once stopped, the grid lacks voxels.
 ///
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.

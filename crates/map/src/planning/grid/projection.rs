@@ -106,8 +106,8 @@ impl<'a> Projection<'a> {
     }
 }
 
-/// The lowest and the highest index of voxels of `level` whose centers lie in a band; in the wrong order where there are
-/// none.
+/// The lowest and the highest index of voxels of `level` whose centers lie in a band; in the wrong order where there
+/// are none.
 pub(in crate::planning) fn band_of(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32; 2] {
     let voxel_m = lattice.resolution_m(level);
     // The voxel that holds the border, from which its center is half a voxel away at most.

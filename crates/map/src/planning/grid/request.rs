@@ -7,7 +7,8 @@ pub struct GridRequest {
     pub level: u32,
     /// Which part of the map, seen from above.
     pub area: GridArea,
-    /// Lowest and highest height, meters: voxels count whose centers lie between them or on them. Infinite ones are fine.
+    /// Lowest and highest height, meters: voxels count whose centers lie between them or on them. Infinite ones are
+    /// fine.
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels.
     pub cell_m: f64,
@@ -20,8 +21,8 @@ pub struct GridRequest {
 /// Part of a map, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GridArea {
-    /// A rectangle, meters; borders of cells lie at whole multiples of a cell's side, and every cell that it meets belongs
-    /// to the grid.
+    /// A rectangle, meters; borders of cells lie at whole multiples of a cell's side, and every cell that it meets
+    /// belongs to the grid.
     Rectangle {
         /// Smallest x and y.
         min_m: [f64; 2],

@@ -114,8 +114,8 @@ impl Solid {
         least_m
     }
 
-    /// True where a part of at most `radius_m` goes through a shape between two places that are so near to each other that
-    /// its way is a line.
+    /// True where a part of at most `radius_m` goes through a shape between two places that are so near to each other
+    /// that its way is a line.
     pub(super) fn crosses(
         &self,
         shapes: &Shapes<'_>,

@@ -1,8 +1,8 @@
 //! Keep-outs beside the voxels: the places where no robot may go count as occupied, as shapes.
 //!
-//! Everything is in meters of the map frame, in f64: shapes have no level. A ball meets a shape where the shape's distance from
-//! its center is at most its radius; a point without a radius where the shape contains it. A map without keep-outs is not
-//! asked: the answers of the voxels stand as they are.
+//! Everything is in meters of the map frame, in f64: shapes have no level. A ball meets a shape where the shape's
+//! distance from its center is at most its radius; a point without a radius where the shape contains it. A map without
+//! keep-outs is not asked: the answers of the voxels stand as they are.
 
 mod figure;
 mod motions;

@@ -36,7 +36,8 @@ impl<'a> Posed<'a> {
         effort.done(words)
     }
 
-    /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once stopped.
+    /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once
+    /// stopped.
     pub(in crate::planning) fn hits(
         &self,
         shapes: &Shapes<'_>,

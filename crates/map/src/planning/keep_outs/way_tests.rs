@@ -1,5 +1,5 @@
-//! Motions among keep-outs, which are met along the whole way, against looks at every few millimeters or less; and how often the
-//! stop signal is looked at.
+//! Motions among keep-outs, which are met along the whole way, against looks at every few millimeters or less; and how
+//! often the stop signal is looked at.
 
 use std::cell::Cell;
 use std::sync::Arc;

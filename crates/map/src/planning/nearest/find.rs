@@ -17,8 +17,8 @@ const POINTS_PER_STOP_CHECK: usize = 64;
 /// Exact: distances are those of f64, in voxels, from the point to the closed cube from i r_n to (i + 1) r_n, or to its
 /// center. A voxel just at the radius is within it. Of voxels equally far, the one of the smallest packed key is taken.
 ///
-/// Where the view has keep-outs ([`MapView::with_keep_outs`]), one that is nearer than all voxels takes their place; distances
-/// to it are those to its border, whatever distances to voxels are measured to.
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), one that is nearer than all voxels takes their place;
+/// distances to it are those to its border, whatever distances to voxels are measured to.
 ///
 /// The view must cover the whole map. Takes 24 bytes a point. Once stopped, the answer has fewer points.
 ///

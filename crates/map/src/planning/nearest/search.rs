@@ -112,7 +112,8 @@ fn for_each_in_shell(
     }
 }
 
-/// Searches the blocks of a cluster whose first cell is `first`: the nearest, then those that may hold something nearer.
+/// Searches the blocks of a cluster whose first cell is `first`: the nearest, then those that may hold something
+/// nearer.
 #[inline]
 fn search_blocks(seeker: &mut Seeker, cluster: &Cluster, first: [i32; 3]) {
     let gaps = seeker.squared_gaps::<BLOCKS>(first, BLOCK_SIDE);

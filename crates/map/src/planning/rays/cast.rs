@@ -14,17 +14,17 @@ use crate::voxel::Cluster;
 
 /// What each ray meets first of the occupied voxels of `level`.
 ///
-/// Voxel i of an axis is the cube from i r_n to (i + 1) r_n, in exact meters. A ray meets the voxels in which it runs for
-/// some way, and not those that it only touches: through an edge or a corner it goes from one voxel to the one across. A
-/// border that it crosses belongs to the voxel that it moves into, and a border along which it runs to the upper voxel, as
-/// points on it do. A voxel that it would enter just where it ends is not met.
+/// Voxel i of an axis is the cube from i r_n to (i + 1) r_n, in exact meters. A ray meets the voxels in which it runs
+/// for some way, and not those that it only touches: through an edge or a corner it goes from one voxel to the one
+/// across. A border that it crosses belongs to the voxel that it moves into, and a border along which it runs to the
+/// upper voxel, as points on it do. A voxel that it would enter just where it ends is not met.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a ray meets the first one that it is inside, its border
 /// included, before it meets a voxel; not one that it would enter just where it ends.
 ///
 /// The view must cover the whole map. The walk leaps over empty space by the blocks and clusters of blocks that are not
-/// there, and comes out where single steps would (both computed in f64, and compared bit for bit in tests). Takes 12 bytes
-/// a ray. Once stopped, rays are left that met nothing yet.
+/// there, and comes out where single steps would (both computed in f64, and compared bit for bit in tests). Takes 12
+/// bytes a ray. Once stopped, rays are left that met nothing yet.
 ///
 /// # Errors
 /// When a ray is none; the error names which, and why.
@@ -41,8 +41,8 @@ pub fn cast_rays(
     })
 }
 
-/// What each ray meets first of the voxels of `level` that are not free: those that are occupied, and those that no scan saw
-/// through, as far as the view has viewpoints ([`MapView::with_viewpoints`]).
+/// What each ray meets first of the voxels of `level` that are not free: those that are occupied, and those that no
+/// scan saw through, as far as the view has viewpoints ([`MapView::with_viewpoints`]).
 ///
 /// As [`cast_rays`] otherwise. Rays go voxel by voxel, and end with the map's lattice.
 ///

@@ -8,8 +8,8 @@ use crate::voxel::VoxelKey;
 pub struct RayHits {
     /// Whether ray i met a voxel or a keep-out: bit i % 64 of `hit[i / 64]`.
     pub hit: Vec<u64>,
-    /// From the origin to where the ray enters the cube of the voxel or the keep-out, meters; 0 where it begins in it, infinite
-    /// where it met none.
+    /// From the origin to where the ray enters the cube of the voxel or the keep-out, meters; 0 where it begins in it,
+    /// infinite where it met none.
     pub distances_m: Vec<f32>,
     /// The voxel, of the level that was asked; of a ray that met none, the voxel of index 0 0 0, and of one
     /// that met a keep-out too.

@@ -52,7 +52,8 @@ impl<'a> InterleavedRays<'a> {
         self.rounds(walks, hits)
     }
 
-    /// [`InterleavedRays::some_rounds`] with all axes of a ray in one register. The sums are the same, in the same order.
+    /// [`InterleavedRays::some_rounds`] with all axes of a ray in one register. The sums are the same, in the same
+    /// order.
     #[cfg(target_arch = "x86_64")]
     fn some_rounds_avx2(
         &mut self,

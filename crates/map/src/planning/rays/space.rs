@@ -101,8 +101,8 @@ impl<'a> Space<'a> {
         if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
     }
 
-    /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that holds
-    /// the cell is occupied.
+    /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that
+    /// holds the cell is occupied.
     #[inline(always)]
     fn empty_levels(&mut self, cell: [i32; 3]) -> Option<u32> {
         let (place, in_block) = (BlockInCluster::of_voxel(cell), Cell::of(cell).1);

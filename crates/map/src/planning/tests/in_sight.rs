@@ -1,5 +1,5 @@
-//! Questions for which unknown voxels are occupied, against a map in which each voxel is occupied that is not free: through
-//! scans, deletions and undo, at all levels.
+//! Questions for which unknown voxels are occupied, against a map in which each voxel is occupied that is not free:
+//! through scans, deletions and undo, at all levels.
 
 use proptest::prelude::*;
 
@@ -48,7 +48,8 @@ fn ignored() -> impl Strategy<Value = Vec<Region>> {
     prop_oneof![2 => Just(Vec::new()), 1 => prop::collection::vec(ball, 1..3)]
 }
 
-/// Asks a planner whose fields live through the history, after each step of it, and one of the solid map: both answer alike.
+/// Asks a planner whose fields live through the history, after each step of it, and one of the solid map: both answer
+/// alike.
 fn through_steps<A: PartialEq + std::fmt::Debug>(
     history: &SeenHistory,
     level: u32,

@@ -17,7 +17,8 @@ use crate::map::{
 use crate::visibility::{RangeImage, Sweep, Viewpoint};
 use crate::voxel::{MomentSet, VoxelKey, VoxelSet};
 
-/// A map that is yet to be made: scans that saw something, of which some were taken back; voxels that were deleted; keep-outs.
+/// A map that is yet to be made: scans that saw something, of which some were taken back; voxels that were deleted;
+/// keep-outs.
 #[derive(Debug, Clone)]
 pub(in crate::planning) struct SeenHistory {
     levels: u32,

@@ -1,5 +1,5 @@
-//! Questions of which a single part is large: they look at the stop signal in proportion to their work, and ask for no more of
-//! the field at once than there is room for.
+//! Questions of which a single part is large: they look at the stop signal in proportion to their work, and ask for no
+//! more of the field at once than there is room for.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -40,7 +40,8 @@ fn at(places: &[[f32; 3]]) -> Vec<f32> {
     places.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0, 0.0, 0.0, 1.0]).collect()
 }
 
-/// Asks until the question is answered, then again with a signal that stops it at each of some looks: how often it looked.
+/// Asks until the question is answered, then again with a signal that stops it at each of some looks: how often it
+/// looked.
 fn looks<A: std::fmt::Debug>(ask: impl Fn(StopSignal<'_>) -> Option<A>) -> usize {
     let looks = Cell::new(0);
     let never = || looks.replace(looks.get() + 1) == usize::MAX;

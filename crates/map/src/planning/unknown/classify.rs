@@ -87,10 +87,10 @@ fn ones(words: &[u64]) -> usize {
 
 /// Says of each point (map frame) whether its voxel of `level` is occupied, free, or unknown.
 ///
-/// Occupied is what has a voxel of the level, or lies in a keep-out where the view has them ([`MapView::with_keep_outs`]): the
-/// point itself. Free is what else a scan saw through, at the center of the point's voxel, where the view has viewpoints
-/// ([`MapView::with_viewpoints`]). All else is unknown: what was never seen, what is hidden, and what a deletion laid bare and
-/// no scan saw through.
+/// Occupied is what has a voxel of the level, or lies in a keep-out where the view has them
+/// ([`MapView::with_keep_outs`]): the point itself. Free is what else a scan saw through, at the center of the point's
+/// voxel, where the view has viewpoints ([`MapView::with_viewpoints`]). All else is unknown: what was never seen, what
+/// is hidden, and what a deletion laid bare and no scan saw through.
 ///
 /// The view must cover the whole map. Takes 2 bits a point. Once stopped, points are left that are said to be unknown.
 ///

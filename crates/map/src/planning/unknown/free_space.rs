@@ -11,7 +11,8 @@ pub(in crate::planning) const ALL: BlockMask = BlockMask([u64::MAX; 8]);
 
 /// What the scans of a map saw through, as they are asked about one voxel after the other.
 ///
-/// A voxel of a level was seen through where a viewpoint saw beyond its center. It is free where nothing occupies it as well.
+/// A voxel of a level was seen through where a viewpoint saw beyond its center. It is free where nothing occupies it as
+/// well.
 #[derive(Debug, Clone)]
 pub(in crate::planning) struct FreeSpace<'a> {
     lattice: &'a Lattice,

@@ -29,7 +29,8 @@ impl Keyword for Unknown {
 /// a view that has them, wherever they are.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surroundings {
-    /// Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. Map frame.
+    /// Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. Map
+    /// frame.
     pub ignored: Vec<Region>,
     /// What unknown voxels count as.
     pub unknown: Unknown,
@@ -44,7 +45,8 @@ impl Surroundings {
         self.unknown == Unknown::Occupied
     }
 
-    /// True where voxels are ignored, so that what is known of the nearest voxel does not tell of the nearest that counts.
+    /// True where voxels are ignored, so that what is known of the nearest voxel does not tell of the nearest that
+    /// counts.
     pub(in crate::planning) fn ignores_some(&self) -> bool {
         !self.ignored.is_empty()
     }
