@@ -17,7 +17,7 @@ const KERNELS: [&str; 9] = [
     "crates/map/src/map/bounds.rs",
     "crates/map/src/map/lookup",
     "crates/map/src/planning/simd.rs",
-    "crates/map/src/planning/rays/turns.rs",
+    "crates/map/src/planning/rays/interleaved.rs",
     "crates/map/src/util/prefetch.rs",
     "crates/lab/src/rivals/dense/offsets",
 ];

@@ -1,14 +1,15 @@
-//! How much work there is between two looks at the stop signal.
+//! How much work there is between two checks of the stop signal.
 
 use std::cell::Cell;
 
 use crate::util::StopSignal;
 
-/// Units of work between two looks. A unit takes some ten nanoseconds: a look-up of eight places in the field, a voxel or a
-/// block that is considered, a test of a place and the box around a keep-out, or a corner of a keep-out.
-pub(super) const WORK_PER_LOOK: u32 = 8192;
+/// Units of work between two checks of the stop signal. A unit takes some ten nanoseconds: a look-up of eight places in
+/// the field, a voxel or a block that is considered, a test of a place and the box around a keep-out, or a corner of a
+/// keep-out.
+pub(super) const WORK_PER_STOP_CHECK: u32 = 8192;
 
-/// The work of a question, counted so that the stop signal is looked at in proportion to it, whatever it asks and however
+/// The work of a question, counted so that the stop signal is checked in proportion to it, whatever it asks and however
 /// few things it asks about.
 #[derive(Debug)]
 pub(super) struct Effort<'a> {
@@ -20,10 +21,10 @@ pub(super) struct Effort<'a> {
 impl<'a> Effort<'a> {
     /// Work that ends when `stop` says so.
     pub(super) fn until(stop: StopSignal<'a>) -> Self {
-        Self { stop, left: Cell::new(WORK_PER_LOOK), is_stopped: Cell::new(false) }
+        Self { stop, left: Cell::new(WORK_PER_STOP_CHECK), is_stopped: Cell::new(false) }
     }
 
-    /// Counts work; looks at the signal where there was enough of it.
+    /// Counts work; checks the signal where there was enough of it.
     #[inline(always)]
     pub(super) fn spend(&self, work: u32) {
         match self.left.get().checked_sub(work) {
@@ -34,7 +35,7 @@ impl<'a> Effort<'a> {
 
     #[cold]
     fn look(&self) {
-        self.left.set(WORK_PER_LOOK);
+        self.left.set(WORK_PER_STOP_CHECK);
         self.is_stopped.set(self.is_stopped.get() || self.stop.is_stopped());
     }
 

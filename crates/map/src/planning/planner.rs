@@ -1,83 +1,37 @@
-//! Who is asked: a map with the fields that make its answers fast.
+//! A map with the fields that make its answers fast.
 
 use std::sync::Arc;
 
-use super::PlanningError;
 use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
+use super::error::PlanningError;
 use super::keep_outs::Shapes;
-use super::look::Look;
-use super::obstacles::{Obstacles, SeenBlocks};
-use super::simd::{self, Work};
-use super::surroundings::{Surroundings, Unknown};
+use super::unknown::{Obstacles, SeenBlocks, Unknown};
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
 use crate::sync::{Rank, RwLock, RwLockReadGuard};
 use crate::util::StopSignal;
 use crate::visibility::ViewpointSet;
 use crate::voxel::Lattice;
 
-/// Times that a question is asked again for what was not made; then the voxels answer.
-const ROUNDS_MAX: usize = 3;
-/// The same for what there was no room to make at once, which may be more than the fields may hold.
-const FULL_ROUNDS_MAX: usize = 64;
-
-/// Blocks that are made between two looks at the stop signal.
-const MADE_PER_LOOK: usize = 32;
+/// Blocks that are made between two checks of the stop signal.
+const MADE_PER_STOP_CHECK: usize = 32;
 
 /// Answers planners' questions about a map.
 ///
-/// It keeps distance fields beside the map: made where they are asked for, renewed where the map changed, bounded in memory.
-/// A map without a planner costs nothing for it. Dropping the planner gives the memory back.
+/// It keeps distance fields beside the map: made where they are asked for, renewed where the map changed, bounded in
+/// memory. A map without a planner costs nothing for it. Dropping the planner gives the memory back.
 #[derive(Debug)]
 pub struct Planner {
-    map: Arc<MultiResolutionMap>,
+    pub(super) map: Arc<MultiResolutionMap>,
     fields: RwLock<Fields>,
     follower: BlockFollower,
-}
-
-/// Answers items of a question one by one.
-pub(super) trait Answerer {
-    /// The answer of an item.
-    type Answer;
-
-    /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
-    /// is. On the last look ([`Look::is_last`]) it always answers, unless the question is to end.
-    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<Self::Answer>;
-
-    /// Answers the items from `first` on that have no answer yet.
-    #[inline(always)]
-    fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<Self::Answer>]) {
-        for (item, answer) in answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
-            if look.is_over() {
-                return;
-            }
-            *answer = self.answer(look, first + item);
-        }
-    }
-}
-
-/// Items that are answered between two looks at the stop signal, those of them that have no answer yet.
-struct Chunk<'a, 'l, A: Answerer> {
-    answerer: &'a mut A,
-    look: &'a mut Look<'l>,
-    first: usize,
-    answers: &'a mut [Option<A::Answer>],
-}
-
-impl<A: Answerer> Work for Chunk<'_, '_, A> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.answerer.answer_all(self.look, self.first, self.answers);
-    }
 }
 
 /// A planner's map at one revision.
 #[derive(Debug)]
 pub struct PlanningView<'a> {
-    planner: &'a Planner,
-    view: MapView<'a>,
-    may_wait: bool,
+    pub(super) planner: &'a Planner,
+    pub(super) view: MapView<'a>,
+    pub(super) may_wait: bool,
     _changes_wait: LongRead<'a>,
 }
 
@@ -87,8 +41,8 @@ impl Planner {
         Self::with_field_bytes(map, FIELD_BYTES_MAX_DEFAULT)
     }
 
-    /// A planner of `map` whose fields hold at most `field_bytes_max` bytes, but for what a question needs at once. Less
-    /// is slower, and as exact.
+    /// A planner of `map` whose fields hold at most `field_bytes_max` bytes, but for what a question needs at once.
+    /// Less is slower, and as exact.
     pub fn with_field_bytes(map: Arc<MultiResolutionMap>, field_bytes_max: usize) -> Self {
         let follower = map.follow_blocks();
         let fields = Fields::new(map.block_levels_end() + 1, field_bytes_max);
@@ -113,9 +67,9 @@ impl Planner {
         PlanningView { planner: self, view, may_wait: true, _changes_wait: changes_wait }
     }
 
-    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be mended
-    /// after a change. A question that needs a part of the fields which is not made yet then has no answer, as if it had
-    /// been stopped.
+    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be
+    /// mended after a change. A question that needs a part of the fields which is not made yet then has no answer, as
+    /// if it had been stopped.
     pub fn try_view(&self) -> Option<PlanningView<'_>> {
         let changes_wait = self.map.try_long_read()?;
         let view = self.map.try_view()?;
@@ -198,60 +152,18 @@ impl PlanningView<'_> {
         Ok(1.0 / lattice.resolution_m(level))
     }
 
-    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped, or where
-    /// it may not wait and would have to.
-    pub(super) fn each<A: Answerer>(
-        &self,
-        level: u32,
-        surroundings: &Surroundings,
-        (count, per_look): (usize, usize),
-        stop: StopSignal<'_>,
-        mut answerer: A,
-    ) -> Option<Vec<A::Answer>> {
-        let mut answers: Vec<Option<A::Answer>> = Vec::with_capacity(count);
-        answers.resize_with(count, || None);
-        for (chunk, answers) in answers.chunks_mut(per_look).enumerate() {
-            let (mut rounds, mut full_rounds) = (0, 0);
-            while answers.iter().any(Option::is_none) {
-                if stop.is_stopped() {
-                    return None;
-                }
-                let fields = self.fields()?;
-                // The viewpoints may have changed since this view took them, by a change that touched no voxel.
-                let is_of_view = self.holds(&fields, surroundings.unknown);
-                let own = (!is_of_view).then(|| Fields::new(self.planner.map.block_levels_end() + 1, 0));
-                let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX || !is_of_view;
-                let of_view = own.as_ref().unwrap_or(&fields);
-                let mut look = Look::new(&self.view, surroundings, level, of_view, is_last, stop);
-                let (answerer, look_at) = (&mut answerer, &mut look);
-                simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
-                if look.is_stopped() {
-                    return None;
-                }
-                *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
-                let unmade = look.into_unmade();
-                drop(fields);
-                if !self.may_wait && !unmade.is_empty() {
-                    return None;
-                }
-                self.make(unmade, surroundings.unknown, stop);
-            }
-        }
-        answers.into_iter().collect()
-    }
-
     /// The fields; none where they have to be waited for and this view may not.
-    fn fields(&self) -> Option<RwLockReadGuard<'_, Fields>> {
+    pub(super) fn fields(&self) -> Option<RwLockReadGuard<'_, Fields>> {
         if self.may_wait { Some(self.planner.fields.read()) } else { self.planner.fields.try_read() }
     }
 
     /// True where fields are those of what this view shows.
-    fn holds(&self, fields: &Fields, unknown: Unknown) -> bool {
+    pub(super) fn holds(&self, fields: &Fields, unknown: Unknown) -> bool {
         unknown == Unknown::Free || fields.are_of(self.view.viewpoints())
     }
 
     /// Makes blocks of the field; once stopped, some of them.
-    fn make(&self, unmade: Vec<FieldBlockKey>, unknown: Unknown, stop: StopSignal<'_>) {
+    pub(super) fn make(&self, unmade: Vec<FieldBlockKey>, unknown: Unknown, stop: StopSignal<'_>) {
         if unmade.is_empty() {
             return;
         }
@@ -260,7 +172,7 @@ impl PlanningView<'_> {
         let seen = if is_known { fields.seen_around(&unmade) } else { SeenBlocks::new() };
         drop(fields);
         let mut obstacles = Obstacles::of(&self.view, unknown, seen);
-        let made = stop.paced(unmade, MADE_PER_LOOK).map(|key| (key, key.make(&mut obstacles)));
+        let made = stop.paced(unmade, MADE_PER_STOP_CHECK).map(|key| (key, key.make(&mut obstacles)));
         let blocks = made.collect();
         let mut fields = self.planner.fields.write();
         if self.holds(&fields, unknown) {

@@ -4,8 +4,8 @@
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
 
-/// Work whose loops over lanes the compiler turns into vector instructions. Its parts must be `#[inline(always)]`, so that
-/// they are compiled with it. The answers are the same bit for bit: no operation is fused or reordered.
+/// Work whose loops over lanes the compiler turns into vector instructions. Its parts must be `#[inline(always)]`, so
+/// that they are compiled with it. The answers are the same bit for bit: no operation is fused or reordered.
 pub(super) trait Work {
     /// What it comes to.
     type Output;

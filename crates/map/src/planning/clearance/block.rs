@@ -31,8 +31,8 @@ const SQUARED: [u8; STEPS] = {
     squared
 };
 
-/// The bytes of a block's row of eight cells, by which of four neighboring voxels of a row are occupied: for each of the six
-/// places of four voxels in the window.
+/// The bytes of a block's row of eight cells, by which of four neighboring voxels of a row are occupied: for each of
+/// the six places of four voxels in the window.
 static OF_FOUR: [[[u8; 8]; 16]; WINDOW / 4] = {
     let mut bytes = [[[FAR; 8]; 16]; WINDOW / 4];
     let mut n = 0;

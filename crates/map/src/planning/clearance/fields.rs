@@ -7,8 +7,7 @@ use super::block::FieldBlock;
 use super::cluster::{CLUSTER_LEVELS, FieldCluster};
 use super::level::FieldLevel;
 use crate::map::{MapView, TouchedBlocks};
-use crate::planning::obstacles::{Obstacles, SeenBlocks};
-use crate::planning::surroundings::Unknown;
+use crate::planning::unknown::{Obstacles, SeenBlocks, Unknown};
 use crate::util::Keyword;
 use crate::visibility::{Viewpoint, ViewpointSet};
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Lattice, VoxelKey};
@@ -16,7 +15,8 @@ use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Lattice, VoxelKey};
 /// Bytes of memory that the fields of a map hold at most where nobody says.
 pub const FIELD_BYTES_MAX_DEFAULT: usize = 128 << 20;
 
-/// Blocks that are forgotten one by one where viewpoints change; where there are more, all go that depend on viewpoints.
+/// Blocks that are forgotten one by one where viewpoints change; where there are more, all go that depend on
+/// viewpoints.
 const FORGOTTEN_BLOCKS_MAX: f64 = 200_000.0;
 
 /// Bytes of memory of a block of which it is kept what was seen through.
@@ -35,8 +35,8 @@ pub(in crate::planning) struct FieldBlockKey {
     pub(in crate::planning) block: VoxelKey,
 }
 
-/// The fields of a map's levels, each made where it is asked for; one of each kind, for unknown voxels that are free and for
-/// such that are occupied.
+/// The fields of a map's levels, each made where it is asked for; one of each kind, for unknown voxels that are free
+/// and for such that are occupied.
 #[derive(Debug)]
 pub(in crate::planning) struct Fields {
     levels: [Vec<FieldLevel>; Unknown::ALL.len()],

@@ -52,7 +52,8 @@ impl FrontierBits {
         self.left.0.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
-    /// Takes the first voxel that is left and all that hang together with it: each touches another one, at a corner at least.
+    /// Takes the first voxel that is left and all that hang together with it: each touches another one, at a corner at
+    /// least.
     pub(super) fn take_cluster(&mut self) -> Option<Cluster> {
         let words = &self.left.0[self.next_word..];
         self.next_word += words.iter().position(|word| *word != 0)?;

@@ -3,8 +3,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use proptest::prelude::*;
 
 use super::*;
-use crate::map::KeepOuts;
-use crate::planning::seen_maps::{SeenMap, seen_history_and_level};
+use crate::map::{KeepOuts, MapView};
+use crate::planning::tests::{SeenMap, seen_history_and_level};
+use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
 /// What is known of each voxel, looked at one by one.

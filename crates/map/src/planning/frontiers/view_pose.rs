@@ -1,10 +1,10 @@
 //! From where a frontier can be seen.
 
-use super::FrontierView;
+use super::frontier::FrontierView;
 use crate::geometry::Pose;
 use crate::map::{MapView, ShapeRay};
-use crate::planning::free_space::FreeSpace;
 use crate::planning::rays::clear_m;
+use crate::planning::unknown::FreeSpace;
 
 /// Directions that are tried for a frontier.
 const DIRECTIONS: usize = 96;
@@ -31,10 +31,11 @@ impl<'a> Lookout<'a> {
         Self { view, level, standoff_m }
     }
 
-    /// The best place for a look at `target_m`, the center of a free voxel, beside which what is unknown lies `outward`.
+    /// The best place for a look at `target_m`, the center of a free voxel, beside which what is unknown lies
+    /// `outward`.
     ///
-    /// Of places as far away as is asked for, the one that looks most toward what is unknown; without one, the one that is furthest
-    /// away.
+    /// Of places as far away as is asked for, the one that looks most toward what is unknown; without one, the one that
+    /// is furthest away.
     pub(super) fn find(&self, target_m: [f64; 3], outward: [f64; 3]) -> Option<FrontierView> {
         let length = norm(outward);
         let outward = outward.map(|c| if length > 0.0 { c / length } else { 0.0 });
@@ -78,7 +79,8 @@ fn norm(vector: [f64; 3]) -> f64 {
     vector.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-/// Directions that are spread evenly: points on a sphere along a spiral, each turned by the golden angle from the one before.
+/// Directions that are spread evenly: points on a sphere along a spiral, each turned by the golden angle from the one
+/// before.
 fn directions() -> impl Iterator<Item = [f64; 3]> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..DIRECTIONS).map(move |n| {

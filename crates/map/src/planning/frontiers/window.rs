@@ -1,15 +1,15 @@
 //! The voxels of a box as bits, with those around it: which are free, and which unknown.
 
-use super::Frontier;
 use super::clusters::{Bits, Cluster, FrontierBits};
+use super::frontier::Frontier;
 use super::view_pose::Lookout;
 use crate::map::{KeepOut, MapView};
-use crate::planning::free_space::{ALL, FreeSpace};
+use crate::planning::unknown::{ALL, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey};
 
-/// Blocks between two looks at the stop signal.
-const BLOCKS_PER_LOOK: usize = 16;
+/// Blocks between two checks of the stop signal.
+const BLOCKS_PER_STOP_CHECK: usize = 16;
 
 /// The voxels of a box and one more on each side.
 #[derive(Debug)]
@@ -56,7 +56,7 @@ impl<'a> Window<'a> {
                 move |y| xs.clone().map(move |x| [x, y, z])
             })
         });
-        for block in stop.paced(blocks, BLOCKS_PER_LOOK).filter_map(VoxelKey::new) {
+        for block in stop.paced(blocks, BLOCKS_PER_STOP_CHECK).filter_map(VoxelKey::new) {
             self.fill_block(view, block, around, &mut free_space);
         }
     }

@@ -2,15 +2,17 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Cells, Grid, Projection};
-use crate::planning::free_space::{CELLS, FreeSpace};
+use super::cells::Cells;
+use super::occupancy_grid::Grid;
+use super::projection::Projection;
+use crate::planning::unknown::{CELLS, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
 
-/// Blocks that nobody looked into between two looks at the stop signal.
-const BLOCKS_PER_LOOK: usize = 1024;
-/// Boxes that viewpoints looked into between two looks at the stop signal.
-const BOXES_PER_LOOK: usize = 4096;
+/// Blocks that nobody looked into between two checks of the stop signal.
+const BLOCKS_PER_STOP_CHECK: usize = 1024;
+/// Boxes that viewpoints looked into between two checks of the stop signal.
+const BOXES_PER_STOP_CHECK: usize = 4096;
 /// Columns of a block.
 const COLUMNS: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
 
@@ -25,7 +27,7 @@ impl Projection<'_> {
             let mut is_seen = [false; COLUMNS];
             for z in zs.clone() {
                 looked += 1;
-                if looked % BLOCKS_PER_LOOK == 0 && stop.is_stopped() {
+                if looked % BLOCKS_PER_STOP_CHECK == 0 && stop.is_stopped() {
                     break 'stacks;
                 }
                 let Some(block) = VoxelKey::new([x, y, z]) else { continue };
@@ -89,7 +91,7 @@ impl Projection<'_> {
         let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
         let (mut low_m, mut high_m) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let boxes_m = self.view.viewpoints().into_iter().flat_map(|viewpoints| viewpoints.boxes_m());
-        for [low, high] in stop.paced(boxes_m, BOXES_PER_LOOK) {
+        for [low, high] in stop.paced(boxes_m, BOXES_PER_STOP_CHECK) {
             low_m = std::array::from_fn(|axis| low_m[axis].min(low[axis]));
             high_m = std::array::from_fn(|axis| high_m[axis].max(high[axis]));
         }

@@ -1,11 +1,13 @@
 //! Keep-outs from above: a cell that has a point of one in the band is occupied.
 
-use super::{Cells, Grid, WHOLE_WITHIN};
+use super::cells::{Cells, WHOLE_WITHIN};
+use super::occupancy_grid::Grid;
 use crate::map::Outline;
 use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;
 
-/// Marks the cells of `grid`, which are `cells`, that have a point of a shape between the heights of the band or on them.
+/// Marks the cells of `grid`, which are `cells`, that have a point of a shape between the heights of the band or on
+/// them.
 pub(super) fn mark(
     shapes: &Shapes<'_>,
     cells: &Cells,
@@ -38,8 +40,8 @@ fn spans(outline: &Outline, cells: &Cells, cell_m: f64) -> [std::ops::Range<i64>
     })
 }
 
-/// True where an outline has a point of a cell. What lies on a border belongs to the upper cell, as points on it do, and
-/// nearly on it counts as on it.
+/// True where an outline has a point of a cell. What lies on a border belongs to the upper cell, as points on it do,
+/// and nearly on it counts as on it.
 fn meets(outline: &Outline, cell: [i64; 2], cell_m: f64) -> bool {
     let corner = |offset: f64| cell.map(|c| (c as f64 + offset - WHOLE_WITHIN) * cell_m);
     outline.meets(corner(0.0), corner(1.0 - WHOLE_WITHIN))

@@ -3,9 +3,9 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::seen_maps::seen_history_and_level;
-use crate::planning::test_maps::{RESOLUTION_M, history_and_level};
-use crate::voxel::VoxelSet;
+use crate::planning::tests::{RESOLUTION_M, history_and_level, seen_history_and_level};
+use crate::util::StopSignal;
+use crate::voxel::{VoxelKey, VoxelSet};
 
 fn map_of(indices: &[[i32; 3]], resolution_m: f64) -> MultiResolutionMap {
     let voxels: VoxelSet = indices.iter().filter_map(|&index| VoxelKey::new(index)).collect();

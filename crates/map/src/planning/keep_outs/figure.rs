@@ -1,10 +1,9 @@
 //! Bodies in meters, as shapes are asked about them.
 
-use super::Shapes;
+use super::shapes::Shapes;
 use crate::map::KeepOut;
+use crate::planning::body::{CellsFromLink, Link, Sphere};
 use crate::planning::effort::Effort;
-use crate::planning::parts::{Link, Sphere};
-use crate::planning::placement::CellsFromLink;
 
 /// A body: its links, each in its own frame.
 #[derive(Debug)]
@@ -115,8 +114,8 @@ impl Solid {
         least_m
     }
 
-    /// True where a part of at most `radius_m` goes through a shape between two places that are so near to each other that
-    /// its way is a line.
+    /// True where a part of at most `radius_m` goes through a shape between two places that are so near to each other
+    /// that its way is a line.
     pub(super) fn crosses(
         &self,
         shapes: &Shapes<'_>,

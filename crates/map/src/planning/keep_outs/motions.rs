@@ -1,15 +1,15 @@
-//! Links along motions among shapes: met along the whole way, and not at steps alone, since a shape may be thinner than any
-//! step.
+//! Links along motions among shapes: met along the whole way, and not at steps alone, since a shape may be thinner than
+//! any step.
 //!
-//! A link that is clear by d cannot meet a shape before one of its centers has moved by d, so it is looked at again there
-//! (conservative advancement); where d is small, after a stride of [`Strides::met_m`]. Between two such places no sphere's
-//! center gets nearer to a shape than its radius less half of that stride. Parts that are smaller than this could go through
-//! a shape between them, so their ways from the one place to the other are tested as lines.
+//! A link that is clear by d cannot meet a shape before one of its centers has moved by d, so it is looked at again
+//! there (conservative advancement); where d is small, after a stride of [`Strides::met_m`]. Between two such places no
+//! sphere's center gets nearer to a shape than its radius less half of that stride. Parts that are smaller than this
+//! could go through a shape between them, so their ways from the one place to the other are tested as lines.
 
-use super::{Shapes, Solid};
+use super::figure::Solid;
+use super::shapes::Shapes;
+use crate::planning::body::{CellsFromLink, LinkMotion};
 use crate::planning::effort::Effort;
-use crate::planning::path::LinkMotion;
-use crate::planning::placement::CellsFromLink;
 
 /// The longest stride past a shape that is near, meters.
 const STRIDE_MAX_M: f64 = 1e-3;
@@ -49,8 +49,8 @@ pub(in crate::planning) struct Way<'a> {
 }
 
 impl Strides {
-    /// Those of a question with steps of `step_m` in a map whose finest voxels have sides of `finest_m`: 1 mm or half such a
-    /// voxel or the step, whichever is least, at every level.
+    /// Those of a question with steps of `step_m` in a map whose finest voxels have sides of `finest_m`: 1 mm or half
+    /// such a voxel or the step, whichever is least, at every level.
     pub(in crate::planning) fn of(step_m: f64, finest_m: f64) -> Self {
         Self { met_m: step_m.min(finest_m / 2.0).min(STRIDE_MAX_M), clearance_max_m: step_m }
     }
@@ -62,8 +62,8 @@ impl Strides {
 }
 
 impl Way<'_> {
-    /// The share of the way, up to `until`, at which the link first meets a shape, no more than a stride late. None where
-    /// it meets none.
+    /// The share of the way, up to `until`, at which the link first meets a shape, no more than a stride late. None
+    /// where it meets none.
     pub(in crate::planning) fn first_met(&self, among: &Among<'_, '_>, until: f64) -> Option<f64> {
         let Among { shapes, strides: Strides { met_m, .. }, effort } = *among;
         let (mut share, mut at) = (0.0, self.at(0.0));
@@ -89,7 +89,8 @@ impl Way<'_> {
         None
     }
 
-    /// The least distance to a shape on the way, meters, where it is less than `least_m`: too much by half a stride at most.
+    /// The least distance to a shape on the way, meters, where it is less than `least_m`: too much by half a stride at
+    /// most.
     pub(in crate::planning) fn least_m(&self, among: &Among<'_, '_>, mut least_m: f64) -> f64 {
         let Among { shapes, strides, effort } = *among;
         let mut share = 0.0;

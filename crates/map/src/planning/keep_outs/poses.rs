@@ -1,10 +1,10 @@
 //! Bodies at poses among shapes.
 
-use super::{Figure, Shapes, Solid};
-use crate::planning::configurations::{Configurations, MAP_FRAME};
+use super::figure::{Figure, Solid};
+use super::shapes::Shapes;
+use crate::planning::answers::{Clearance, Hit, Met};
+use crate::planning::body::{CellsFromLink, Configurations, LinkPose, MAP_FRAME};
 use crate::planning::effort::Effort;
-use crate::planning::kind::{Clearance, Hit, Met};
-use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::util::StopSignal;
 
 /// Something that is asked about again and again, each time elsewhere or another one.
@@ -36,7 +36,8 @@ impl<'a> Posed<'a> {
         effort.done(words)
     }
 
-    /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once stopped.
+    /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once
+    /// stopped.
     pub(in crate::planning) fn hits(
         &self,
         shapes: &Shapes<'_>,

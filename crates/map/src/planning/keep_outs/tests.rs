@@ -9,7 +9,7 @@ use crate::map::test_shapes::shape;
 use crate::map::{
     KeepOut, KeepOutName, KeepOutShape, KeepOuts, MapContents, MapSettings, MultiResolutionMap, ShapeRay,
 };
-use crate::planning::placement::{CellsFromLink, LinkPose};
+use crate::planning::body::{CellsFromLink, LinkPose};
 use crate::planning::*;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;

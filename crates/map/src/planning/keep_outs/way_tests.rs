@@ -1,5 +1,5 @@
-//! Motions among keep-outs, which are met along the whole way, against looks at every few millimeters or less; and how often the
-//! stop signal is looked at.
+//! Motions among keep-outs, which are met along the whole way, against looks at every few millimeters or less; and how
+//! often the stop signal is looked at.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -10,9 +10,8 @@ use super::tests::{BruteForce, RESOLUTION_M, body_and_poses, map, map_of, poses_
 use crate::geometry::Point;
 use crate::map::test_shapes::shape;
 use crate::map::{KeepOutShape, MultiResolutionMap, Prism, Region};
-use crate::planning::effort::WORK_PER_LOOK;
-use crate::planning::path::LinkMotion;
-use crate::planning::placement::LinkPose;
+use crate::planning::body::{LinkMotion, LinkPose};
+use crate::planning::effort::WORK_PER_STOP_CHECK;
 use crate::planning::*;
 use crate::util::StopSignal;
 
@@ -267,7 +266,7 @@ fn questions_among_shapes_look_at_the_signal_in_proportion_to_their_work_and_end
             // What is away from the ball around the link is tested once for it, and not for each sphere.
             let tests = if number == 0 { prisms * count } else { (spheres * prisms * count) * 65 };
             let a_look = tests as u64 / looks;
-            assert!(a_look <= u64::from(WORK_PER_LOOK), "question {number}: {a_look} tests a look");
+            assert!(a_look <= u64::from(WORK_PER_STOP_CHECK), "question {number}: {a_look} tests a look");
             for looks_max in [0, 1, looks / 2, looks - 1] {
                 let (is_answered, made) = asked_until(looks_max, ask);
                 assert!(!is_answered && made <= looks_max + 2, "{number}: {made} looks after {looks_max}");

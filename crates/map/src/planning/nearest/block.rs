@@ -6,8 +6,8 @@ use crate::voxel::{BLOCK_SIDE, BlockMask, VoxelKey};
 /// Cells along a block's side.
 const CELLS: usize = BLOCK_SIDE as usize;
 
-/// Squared distances of a point to a block's voxels, axis by axis: for each cell along the axis, that to the voxel of the
-/// level which holds it.
+/// Squared distances of a point to a block's voxels, axis by axis: for each cell along the axis, that to the voxel of
+/// the level which holds it.
 struct Gaps([[f64; CELLS]; 3]);
 
 impl Gaps {

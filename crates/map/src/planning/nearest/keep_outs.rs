@@ -1,6 +1,6 @@
 //! Points among keep-outs: the nearest is a keep-out where one is nearer than all voxels.
 
-use super::{Nearest, NearestVoxels};
+use super::nearest_voxels::{Nearest, NearestVoxels};
 use crate::geometry::Point;
 use crate::planning::effort::Effort;
 use crate::planning::keep_outs::Shapes;

@@ -1,11 +1,12 @@
 //! The search around one point: clusters near first, then blocks near first, as far as they can hold something nearer.
 
 use super::block::nearest_in_block;
+use super::nearest_voxels::Nearest;
+use super::request::MeasuredTo;
 use super::seeker::Seeker;
-use super::{MeasuredTo, Nearest};
 use crate::geometry::Point;
 use crate::map::TierView;
-use crate::planning::remembered::Remembered;
+use crate::planning::recent_clusters::RecentClusters;
 use crate::util::bits::for_each_bit;
 use crate::voxel::{BLOCK_SIDE, BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, Cluster, VoxelKey};
 
@@ -14,7 +15,7 @@ const BLOCKS: usize = 1 << CLUSTER_LEVELS;
 
 /// A search within one radius. All lengths are in cells, see [`TierView`].
 pub(super) struct Search<'a> {
-    clusters: Remembered<'a>,
+    clusters: RecentClusters<'a>,
     radius: f64,
     /// How far inside its cube's faces a voxel is measured to: 0, or half its side.
     inset: f64,
@@ -28,7 +29,7 @@ impl<'a> Search<'a> {
             MeasuredTo::Cubes => 0.0,
             MeasuredTo::Centers => side / 2.0,
         };
-        Self { radius: radius_m / view.cell_m(), inset, clusters: Remembered::new(view, nothing) }
+        Self { radius: radius_m / view.cell_m(), inset, clusters: RecentClusters::new(view, nothing) }
     }
 
     /// The nearest voxel within the radius of `point`.
@@ -111,7 +112,8 @@ fn for_each_in_shell(
     }
 }
 
-/// Searches the blocks of a cluster whose first cell is `first`: the nearest, then those that may hold something nearer.
+/// Searches the blocks of a cluster whose first cell is `first`: the nearest, then those that may hold something
+/// nearer.
 #[inline]
 fn search_blocks(seeker: &mut Seeker, cluster: &Cluster, first: [i32; 3]) {
     let gaps = seeker.squared_gaps::<BLOCKS>(first, BLOCK_SIDE);

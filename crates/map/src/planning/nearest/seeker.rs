@@ -29,8 +29,8 @@ impl Seeker {
         Self { at, inset, up, best: Best { squared: radius * radius, key: u64::MAX } }
     }
 
-    /// Squared distances, axis by axis, to each of `N` cubes in a row, of `side` cells, the first at `first`: to whatever of
-    /// it voxels are measured to.
+    /// Squared distances, axis by axis, to each of `N` cubes in a row, of `side` cells, the first at `first`: to
+    /// whatever of it voxels are measured to.
     #[inline(always)]
     pub(super) fn squared_gaps<const N: usize>(&self, first: [i32; 3], side: i32) -> [[f64; N]; 3] {
         std::array::from_fn(|axis| {

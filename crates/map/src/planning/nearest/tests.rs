@@ -1,9 +1,11 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::geometry::Point;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::test_maps::{history_and_level, point};
-use crate::voxel::VoxelSet;
+use crate::planning::tests::{history_and_level, point};
+use crate::util::StopSignal;
+use crate::voxel::{VoxelKey, VoxelSet};
 
 /// The nearest voxel, by a look at every one of them.
 fn nearest_of_all(

@@ -30,9 +30,9 @@ const FACES: [Face; 6] = {
     faces
 };
 
-/// The empty box around `cell` for so many rays that begin there: whole blocks first, a layer on each side in turn, then what is
-/// empty of the blocks beside it, as whole voxels of `1 << up` cells. It ends where `bounds` do. None where the block that
-/// holds `cell` is not empty, or the rays are too few to look for it.
+/// The empty box around `cell` for so many rays that begin there: whole blocks first, a layer on each side in turn,
+/// then what is empty of the blocks beside it, as whole voxels of `1 << up` cells. It ends where `bounds` do. None
+/// where the block that holds `cell` is not empty, or the rays are too few to look for it.
 pub(super) fn clear_box(
     blocks: &mut impl Blocks,
     cell: [i32; 3],

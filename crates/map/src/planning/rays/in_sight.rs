@@ -1,11 +1,13 @@
 //! Rays that unknown space ends: they go voxel by voxel, as far as scans saw.
 
+use super::hits::RayHits;
 use super::ray::Ray;
+use super::rays_in_cells::Request;
+use super::request::RayError;
 use super::space::{Space, Step};
-use super::{RayError, RayHits, Request};
 use crate::map::{MapView, ShapeRay};
 use crate::planning::effort::Effort;
-use crate::planning::free_space::FreeSpace;
+use crate::planning::unknown::FreeSpace;
 use crate::util::StopSignal;
 use crate::voxel::Cluster;
 

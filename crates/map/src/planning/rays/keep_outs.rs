@@ -1,13 +1,14 @@
 //! Rays among keep-outs: each ends where it enters the first one, where that is before it meets a voxel.
 
-use super::{RayError, RayHits, Rays};
+use super::hits::RayHits;
+use super::request::{RayError, Rays};
 use crate::map::ShapeRay;
 use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
-/// Rays between two looks at the stop signal.
-const RAYS_PER_LOOK: usize = 64;
+/// Rays between two checks of the stop signal.
+const RAYS_PER_STOP_CHECK: usize = 64;
 
 /// Ends rays at shapes. A border that a ray enters just where it ends is not met.
 pub(super) fn end_at(
@@ -16,7 +17,7 @@ pub(super) fn end_at(
     hits: &mut RayHits,
     stop: StopSignal<'_>,
 ) -> Result<(), RayError> {
-    for number in stop.paced(0..rays.len(), RAYS_PER_LOOK) {
+    for number in stop.paced(0..rays.len(), RAYS_PER_STOP_CHECK) {
         let (ray, range_m) = rays.ray(number)?;
         // A voxel's distance is told as a float: what is not nearer than that is behind the voxel.
         let (mut end_m, mut first) = (range_m.min(f64::from(hits.distances_m[number])), None);

@@ -8,8 +8,8 @@ const LANES: usize = 4;
 
 /// A ray in cells, each axis along which it descends turned over, so that it ascends along all of them.
 ///
-/// It passes the border below cell i of an axis at `(i - origin) * m_a_cell` meters, computed in just this way wherever it
-/// is needed. So a leap over many cells ends in the cell that single steps would have led to, bit for bit.
+/// It passes the border below cell i of an axis at `(i - origin) * m_a_cell` meters, computed in just this way wherever
+/// it is needed. So a leap over many cells ends in the cell that single steps would have led to, bit for bit.
 ///
 /// Turned over, cell i is cell -1 - i, and a border belongs to the cell that the ray moves into.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +33,8 @@ pub(super) struct Place {
     cell: [i32; LANES],
 }
 
-/// How near to a border, in cells, the cell of a place is decided by where the ray passes the border: far more than rounding
-/// moves a place, which is at most 2^-29 of a cell.
+/// How near to a border, in cells, the cell of a place is decided by where the ray passes the border: far more than
+/// rounding moves a place, which is at most 2^-29 of a cell.
 const NEAR_BORDER: f64 = 1e-6;
 /// Adding it rounds a number below 2^31 to a whole one, which is then the sum's low 32 bits.
 const ROUNDS: f64 = 1.5 * (1u64 << 52) as f64;
@@ -60,8 +60,8 @@ impl Ray {
         std::array::from_fn(|axis| place.cell[axis] ^ self.turned[axis])
     }
 
-    /// Where the ray meets a box, and the distance at which it leaves it or ends, meters: none where it does not meet it
-    /// before `range_m`.
+    /// Where the ray meets a box, and the distance at which it leaves it or ends, meters: none where it does not meet
+    /// it before `range_m`.
     #[inline(always)]
     pub(super) fn clipped(&self, bounds: &CellBounds, range_m: f64) -> Option<(Place, f64)> {
         let (mut at_m, mut end_m) = (0.0, range_m);
@@ -75,7 +75,8 @@ impl Ray {
         (at_m < end_m).then(|| (Place { at_m, cell: self.cells_at(at_m) }, end_m))
     }
 
-    /// Where the ray leaves the cube of 2^`levels` cells' side, aligned as voxels of coarser levels are, that holds a place.
+    /// Where the ray leaves the cube of 2^`levels` cells' side, aligned as voxels of coarser levels are, that holds a
+    /// place.
     #[inline(always)]
     pub(super) fn beyond(&self, place: &Place, levels: u32) -> Place {
         self.beyond_borders(place.cell.map(|i| (i | ((1 << levels) - 1)) + 1))

@@ -3,13 +3,13 @@
 use super::clear_box::{Blocks, clear_box};
 use super::ray::{Place, Ray};
 use crate::map::{CellBounds, TierView};
-use crate::planning::free_space::FreeSpace;
-use crate::planning::remembered::Remembered;
+use crate::planning::recent_clusters::RecentClusters;
+use crate::planning::unknown::FreeSpace;
 use crate::voxel::{BLOCK_LEVELS, BlockInCluster, BlockMask, Cell, Cluster, VoxelKey};
 
 /// The voxels of one level.
 pub(super) struct Space<'a> {
-    clusters: Remembered<'a>,
+    clusters: RecentClusters<'a>,
     bounds: CellBounds,
     /// The empty box around the place where the rays begin whose turn it is.
     clear: Option<CellBounds>,
@@ -50,7 +50,7 @@ impl<'a> Space<'a> {
     /// Space without a voxel beyond `bounds`; `nothing` is a cluster without a block.
     pub(super) fn new(view: TierView<'a>, bounds: CellBounds, nothing: &'a Cluster) -> Self {
         let (up, piece_levels) = (view.up(), view.piece_levels());
-        Self { clusters: Remembered::new(view, nothing), bounds, clear: None, up, piece_levels }
+        Self { clusters: RecentClusters::new(view, nothing), bounds, clear: None, up, piece_levels }
     }
 
     /// Looks at what is around `origin` (cells), where the next so many rays begin.
@@ -101,8 +101,8 @@ impl<'a> Space<'a> {
         if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
     }
 
-    /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that holds
-    /// the cell is occupied.
+    /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that
+    /// holds the cell is occupied.
     #[inline(always)]
     fn empty_levels(&mut self, cell: [i32; 3]) -> Option<u32> {
         let (place, in_block) = (BlockInCluster::of_voxel(cell), Cell::of(cell).1);
@@ -111,9 +111,9 @@ impl<'a> Space<'a> {
     }
 }
 
-impl Blocks for Remembered<'_> {
+impl Blocks for RecentClusters<'_> {
     #[inline(always)]
     fn around(&mut self, cell: [i32; 3]) -> &BlockMask {
-        Remembered::around(self, cell).get(BlockInCluster::of_voxel(cell))
+        RecentClusters::around(self, cell).get(BlockInCluster::of_voxel(cell))
     }
 }

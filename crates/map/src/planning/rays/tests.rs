@@ -1,9 +1,11 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::geometry::Point;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::planning::test_maps::{RESOLUTION_M, history_and_level, point};
-use crate::voxel::VoxelSet;
+use crate::planning::tests::{RESOLUTION_M, history_and_level, point};
+use crate::util::StopSignal;
+use crate::voxel::{VoxelKey, VoxelSet};
 
 /// A map of the voxels of these indices, of 1 m.
 fn map_of(indices: &[[i32; 3]], levels: u32) -> MultiResolutionMap {

@@ -4,9 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::geometry::Point;
 use crate::map::MultiResolutionMap;
-use crate::planning::cubes::squared_distance;
-use crate::planning::path::LinkMotion;
-use crate::planning::placement::{CellsFromLink, LinkPose};
+use crate::planning::body::{CellsFromLink, LinkMotion, LinkPose};
+use crate::planning::clearance::squared_distance;
 use crate::planning::*;
 use crate::voxel::{Lattice, VoxelKey};
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{RESOLUTION_M, exchange};
+use super::made::{RESOLUTION_M, exchange};
 use crate::geometry::Point;
 use crate::map::{MapSettings, MultiResolutionMap};
 use crate::planning::*;

@@ -7,6 +7,9 @@ use crate::map::{MultiResolutionMap, Region};
 use crate::planning::*;
 use crate::voxel::{VoxelKey, VoxelSet};
 
+/// Side of a finest voxel, meters.
+pub(super) const RESOLUTION_M: f64 = 0.5;
+
 /// A change: voxels that go, and voxels that come.
 pub(super) type Exchange = (Vec<[i32; 3]>, Vec<[i32; 3]>);
 

@@ -1,0 +1,52 @@
+//! Drawing a grid: voxels, keep-outs, and what is free.
+
+use super::cells::Cells;
+use super::keep_outs;
+use super::occupancy_grid::Grid;
+use super::projection::Projection;
+use super::request::{GridArea, GridError, GridRequest};
+use crate::map::MapView;
+use crate::planning::keep_outs::Shapes;
+use crate::util::StopSignal;
+
+/// Which cells of a grid have occupied voxels of a level in a band of height, and how high these reach.
+///
+/// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each
+/// voxel lies in one cell. Voxels of the band are those whose centers lie in it, as those of a [`Region`] are.
+///
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
+/// too; they have no top, and make no grid larger that is as large as what is there.
+///
+/// Where that is asked for, a cell is free that is not occupied and in which each column of voxels has a free one in
+/// the band: one that a scan saw through, where the view has viewpoints ([`MapView::with_viewpoints`]). Whoever drives
+/// there drove or looked through the column at some height; what is above or below of it may be unknown. Cells that are
+/// neither are unknown.
+///
+/// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a
+/// cell, and 4 more where cells are told apart. The view must cover the whole map. Once stopped, the grid lacks voxels.
+///
+/// # Errors
+/// When a number is out of range, or there are more cells than may be.
+pub fn project_grid(
+    view: &MapView<'_>,
+    request: &GridRequest,
+    stop: StopSignal<'_>,
+) -> Result<Grid, GridError> {
+    let projection = Projection::of(view, request)?;
+    let cells = match request.area {
+        GridArea::Rectangle { min_m, max_m } => Cells::of_rectangle(min_m, max_m, projection.cell_m),
+        GridArea::Occupied => projection.occupied_cells(stop),
+    };
+    let count = cells.size(0) as f64 * cells.size(1) as f64;
+    if count > request.cells_max as f64 {
+        return Err(GridError::Cells { cells: count, cell_m: projection.cell_m, most: request.cells_max });
+    }
+    let mut grid = projection.grid(&cells, stop);
+    if let Some(shapes) = Shapes::of(view) {
+        keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
+    }
+    if request.tells_unknown {
+        grid.free = Some(projection.free_cells(&cells, &grid, stop));
+    }
+    Ok(grid)
+}

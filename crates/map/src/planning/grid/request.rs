@@ -1,0 +1,75 @@
+//! The request: which part of the map, which band of height, how large the cells.
+
+/// What to draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridRequest {
+    /// Level of the voxels.
+    pub level: u32,
+    /// Which part of the map, seen from above.
+    pub area: GridArea,
+    /// Lowest and highest height, meters: voxels count whose centers lie between them or on them. Infinite ones are
+    /// fine.
+    pub band_m: [f64; 2],
+    /// Side of a cell, meters: a whole number of the level's voxels.
+    pub cell_m: f64,
+    /// True where cells without a voxel are told apart: free ones and unknown ones. It takes more time.
+    pub tells_unknown: bool,
+    /// Most cells of the grid.
+    pub cells_max: usize,
+}
+
+/// Part of a map, seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GridArea {
+    /// A rectangle, meters; borders of cells lie at whole multiples of a cell's side, and every cell that it meets
+    /// belongs to the grid.
+    Rectangle {
+        /// Smallest x and y.
+        min_m: [f64; 2],
+        /// Largest x and y.
+        max_m: [f64; 2],
+    },
+    /// As much as has voxels in the band.
+    Occupied,
+}
+
+/// Why a grid cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// A rectangle with corners that are not finite or in the wrong order.
+    #[error("area.min_m must be finite and not exceed area.max_m in x or y, got {0:?} and {1:?}")]
+    Rectangle([f64; 2], [f64; 2]),
+    /// A corner that no map of this resolution reaches.
+    #[error("area.{field} must lie within {min_m} m and {max_m} m, as the map does, got {value:?}")]
+    Range {
+        /// The corner.
+        field: &'static str,
+        /// Its x and y, meters.
+        value: [f64; 2],
+        /// The smallest coordinate of the map, meters.
+        min_m: f64,
+        /// The largest.
+        max_m: f64,
+    },
+    /// A band with NaN or in the wrong order.
+    #[error("min_z_m must be at most max_z_m, got {} and {}", .0[0], .0[1])]
+    Band([f64; 2]),
+    /// A cell that is no whole number of voxels.
+    #[error("cell_m must be a whole number of voxels of {voxel_m} m, got {cell_m}")]
+    Cell {
+        /// The cell's side, meters.
+        cell_m: f64,
+        /// Side of a voxel of the level, meters.
+        voxel_m: f64,
+    },
+    /// Too many cells.
+    #[error("a grid may have {most} cells, the area has {cells} of {cell_m} m")]
+    Cells {
+        /// Number of cells of the area.
+        cells: f64,
+        /// The cell's side, meters.
+        cell_m: f64,
+        /// Most cells.
+        most: usize,
+    },
+}
