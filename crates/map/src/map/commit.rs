@@ -356,3 +356,10 @@ struct Locks<'a> {
     /// What was in shards that lost everything: to give back its memory takes a while, so it comes last.
     _emptied: Vec<Shard>,
 }
+
+impl MultiResolutionMap {
+    /// Waits for the turn to change the map.
+    pub fn committer(&self) -> Committer<'_> {
+        Committer::begin(self)
+    }
+}

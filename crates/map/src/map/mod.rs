@@ -34,6 +34,7 @@ mod name;
 mod occupied_voxel_list;
 mod published;
 mod region;
+mod selected;
 mod settings;
 mod shard;
 mod shard_level;
@@ -88,7 +89,6 @@ pub use voxel_selection::VoxelSelection;
 
 use std::sync::Arc;
 
-use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
 use crate::visibility::ViewpointSet;
 use crate::voxel::{Cell, Lattice, MOMENT_LEVEL, Moments, VoxelKey};
@@ -96,7 +96,7 @@ use followers::Followers;
 use moments::ShardedMoments;
 use published::Published;
 use shard::Shard;
-use sharding::{Sharding, ShardsTouched};
+use sharding::Sharding;
 
 /// A multi-resolution occupied voxel list (MROL, paper III): level n holds the occupied voxels of
 /// r_n = r_0 * 2^n, with the trajectory of the poses from which they were seen.
@@ -222,40 +222,6 @@ impl MultiResolutionMap {
         self.requests.read()
     }
 
-    /// Locks the whole map for reading, at one revision. For a few milliseconds at most: whoever reads for longer
-    /// begins with [`MultiResolutionMap::long_read`].
-    pub fn view(&self) -> MapView<'_> {
-        MapView::lock(self, ShardsTouched::all())
-    }
-
-    /// Keeps changes from beginning to take their locks, for a read that takes longer than a few milliseconds. Changes
-    /// wait for it, and for no other: a long read that comes while one waits goes behind it. Readers of
-    /// [`MultiResolutionMap::view`] and [`MultiResolutionMap::view_of`] wait for neither.
-    pub fn long_read(&self) -> LongRead<'_> {
-        LongRead { _changes_wait: self.long_reads.read(), map: self }
-    }
-
-    /// [`MultiResolutionMap::long_read`] where no change has to be waited for; none elsewhere. For threads that may not wait.
-    pub fn try_long_read(&self) -> Option<LongRead<'_>> {
-        Some(LongRead { _changes_wait: self.long_reads.try_read()?, map: self })
-    }
-
-    /// [`MultiResolutionMap::view`] where no lock has to be waited for; none elsewhere. For threads that may not wait.
-    pub fn try_view(&self) -> Option<MapView<'_>> {
-        MapView::try_lock(self, ShardsTouched::all())
-    }
-
-    /// Locks what `points`, placed at `map_from_points`, can fall in.
-    pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
-        MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
-    }
-
-    /// [`MultiResolutionMap::view_of`] where no lock has to be waited for; none elsewhere. For threads that may not
-    /// wait.
-    pub fn try_view_of(&self, points: &[Point], map_from_points: &Pose) -> Option<MapView<'_>> {
-        MapView::try_lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
-    }
-
     /// Locks the moments of the map's points for reading, at one revision; before a view of the voxels, where both
     /// are needed. None of a map that keeps no moments.
     pub fn moments(&self) -> Option<MomentsView<'_>> {
@@ -274,10 +240,5 @@ impl MultiResolutionMap {
     /// Follows which blocks change from now on, for what is derived of the voxels. Changes cost a little more meanwhile.
     pub fn follow_blocks(&self) -> BlockFollower {
         self.followers.add()
-    }
-
-    /// Waits for the turn to change the map.
-    pub fn committer(&self) -> Committer<'_> {
-        Committer::begin(self)
     }
 }

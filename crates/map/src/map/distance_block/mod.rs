@@ -12,9 +12,12 @@
 //!
 //! As all is capped, no row farther than [`margin_of`] the cap counts, and a row without anything near is skipped.
 
+mod cap;
 mod layer;
 mod rows;
 mod transform;
+
+pub use cap::{DISTANCE_CAP_MAX, margin_of};
 
 use std::num::NonZeroU8;
 
@@ -22,9 +25,6 @@ use super::CellBox;
 use crate::util::StopSignal;
 use crate::voxel::VoxelSet;
 use transform::Transform;
-
-/// The largest distance that a block can tell, in quarter cells.
-pub const DISTANCE_CAP_MAX: NonZeroU8 = NonZeroU8::MAX;
 
 /// The distance of each cell of a box from the nearest occupied voxel of the level.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,11 +38,6 @@ pub struct DistanceBlock {
     /// A byte a cell, x fastest, then y: quarter cells from the cell's center to the nearest occupied cube, rounded down;
     /// 0 for an occupied cell, and never more than `cap`.
     pub distances: Vec<u8>,
-}
-
-/// How many cells around a box count for distances up to `cap`: a cube farther away is at least as far.
-pub fn margin_of(cap: NonZeroU8) -> i32 {
-    i32::from(cap.get().div_ceil(2)) / 2
 }
 
 impl DistanceBlock {

@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU8;
 
+use super::cap::margin_of;
 use super::layer::Layer;
-use super::margin_of;
 use super::rows::Rows;
 use crate::map::CellBox;
 use crate::util::StopSignal;

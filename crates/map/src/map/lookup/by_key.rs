@@ -1,6 +1,7 @@
 //! The look-up in the filter alone, of voxels whose keys are known: what experiment 1 of the paper times by itself (IV-A).
 
-use super::{LevelView, scalar};
+use super::level_view::LevelView;
+use super::scalar;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2, avx512};
 #[cfg(target_arch = "x86_64")]

@@ -1,7 +1,7 @@
 //! The look-up as it is defined, point by point; the reference implementation, which runs where the CPU has no
 //! SIMD instructions.
 
-use super::{LevelView, Lookup};
+use super::level_view::{LevelView, Lookup};
 use crate::bloom::Probe;
 use crate::geometry::Point;
 use crate::map::sharding::shard_of_region;

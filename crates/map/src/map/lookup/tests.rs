@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 
-use super::{LevelView, Lookup, scalar};
+use super::level_view::{LevelView, Lookup};
+use super::scalar;
 use crate::bloom::{FilterSettings, HASHES_MAX};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};

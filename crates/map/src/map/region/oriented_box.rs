@@ -1,6 +1,6 @@
 //! Boxes that stand at an angle.
 
-use super::{REGION_M_MAX, RegionError};
+use super::error::{REGION_M_MAX, RegionError};
 use crate::geometry::{Pose, translation_m};
 
 /// A box with any orientation, border included.

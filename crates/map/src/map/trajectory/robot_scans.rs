@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use super::chunked::Chunked;
 use super::id_ranges::IdRanges;
+use super::known_scan::ForgottenIds;
+use super::scan::MappedScan;
 use super::session::Session;
 use super::thinning::Seen;
-use super::{ForgottenIds, MappedScan};
 use crate::map::SessionName;
 
 /// Sessions of one robot whose scan ids a map tells apart, at most, besides the empty one. Beyond, the session that was

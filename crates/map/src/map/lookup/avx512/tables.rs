@@ -2,11 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::super::LANES;
-use super::super::registers::{
-    PerShard, addresses, gather_now, gather_pairs, lengths, load, mix, scale, to_array,
-};
-use crate::map::lookup::LevelView;
+use super::registers::{PerShard, addresses, gather_now, gather_pairs, lengths, load, mix, scale, to_array};
+use crate::map::lookup::level_view::LevelView;
+use crate::voxel::quantize::avx512::LANES;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CLUSTER_LEVELS, CacheLine, Cluster, Slots};
 
 /// Descriptors of the shards' tables, which stay in registers.
