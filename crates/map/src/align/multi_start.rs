@@ -6,7 +6,10 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::ascent::Ascent;
 use super::overlap::Overlap;
-use super::{Alignment, AlignmentSettings, PosePrior, SampledScan, Verdict, climb, finish};
+use super::prior::PosePrior;
+use super::settings::AlignmentSettings;
+use super::verdict::{Alignment, Verdict};
+use super::{SampledScan, climb, finish};
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;

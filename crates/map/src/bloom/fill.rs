@@ -5,8 +5,8 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 
-use super::Probe;
 use super::counters::Counters;
+use super::probe::Probe;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
 use crate::util::prefetch;
@@ -43,8 +43,8 @@ fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[
 
 #[cfg(test)]
 mod tests {
-    use super::super::HASHES_MAX;
     use super::*;
+    use crate::bloom::rates::HASHES_MAX;
     use proptest::prelude::*;
 
     type Kernel = fn(&mut [u64], &mut Counters, u32, &[u64]);

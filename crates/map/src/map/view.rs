@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use super::content_hash::ContentVersion;
+use super::keep_out::KeepOuts;
 use super::lookup::{self, LevelView, Lookup};
-use super::occupied_voxel_list::tier_of;
-use super::shard::Shard;
-use super::sharding::{SHARDS, ShardsTouched};
-use super::tier_view::TierView;
-use super::{ContentVersion, KeepOuts, MomentsView, MultiResolutionMap, OccupiedVoxelList};
+use super::moments::MomentsView;
+use super::multi_resolution_map::MultiResolutionMap;
+use super::shards::{OccupiedVoxelList, SHARDS, Shard, ShardsTouched, TierView, tier_of};
 use crate::geometry::{Point, Pose};
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;

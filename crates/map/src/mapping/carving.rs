@@ -11,7 +11,7 @@
 //!   that is seen at a grazing angle is one rim beside the other, so nothing is carved in front of it or from it;
 //! * only as far as the points lie as close to each other as voxels do, or half as far again, and within a range.
 
-use super::MappingError;
+use super::error::MappingError;
 use crate::geometry::{Point, Pose};
 use crate::map::{MultiResolutionMap, Region, ScanRecord};
 use crate::util::StopSignal;

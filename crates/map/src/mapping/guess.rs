@@ -1,6 +1,6 @@
 //! Where a scan is thought to have been taken.
 
-use super::MappingError;
+use super::error::MappingError;
 use super::sightings::Sightings;
 use crate::geometry::{Pose, extrapolate};
 use crate::map::{MappedScan, RobotName, Trajectory};

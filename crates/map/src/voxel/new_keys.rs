@@ -7,8 +7,8 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 
-use super::block::OFFSETS;
-use super::{BLOCK_LEVELS, BlockMask, VoxelKey};
+use super::block::{BLOCK_LEVELS, BlockMask, OFFSETS};
+use super::key::VoxelKey;
 use crate::util::bits::for_each_bit;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
@@ -40,7 +40,7 @@ fn keys_gained_scalar(before: &BlockMask, added: &BlockMask, first: u64, up: u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::Cell;
+    use crate::voxel::block::Cell;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 

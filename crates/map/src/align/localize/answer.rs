@@ -1,6 +1,6 @@
 //! Results of global localization.
 
-use crate::align::{Alignment, Verdict};
+use crate::align::verdict::{Alignment, Verdict};
 use crate::geometry::Pose;
 use crate::map::ContentVersion;
 

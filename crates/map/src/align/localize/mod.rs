@@ -36,7 +36,8 @@ pub use settings::LocalizationSettings;
 pub use supervision::Supervision;
 
 use super::extent::within_extent;
-use super::{AlignmentSettings, Verdict};
+use super::settings::AlignmentSettings;
+use super::verdict::Verdict;
 use crate::geometry::Point;
 use crate::map::{ContentVersion, MultiResolutionMap};
 use crate::util::StopSignal;

@@ -10,7 +10,7 @@ mod gaussian;
 mod gaussians;
 mod known_moments;
 
-use super::PoseInformation;
+use super::information::PoseInformation;
 use super::settings::RefinementSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;

@@ -8,7 +8,7 @@ use super::{avx2, avx512};
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::VoxelKey;
 
-/// [`super::occupied`] by the filter, which must be there, of voxels of the view's level whose keys are known.
+/// [`super::by_point::occupied`] by the filter, which must be there, of voxels of the view's level whose keys are known.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
@@ -40,7 +40,11 @@ mod tests {
     use super::*;
     use crate::bloom::{FilterSettings, HASHES_MAX};
     use crate::geometry::Point;
-    use crate::map::{Lookup, MapContents, MapSettings, MultiResolutionMap, lookup};
+    use crate::map::contents::MapContents;
+    use crate::map::lookup;
+    use crate::map::lookup::level_view::Lookup;
+    use crate::map::multi_resolution_map::MultiResolutionMap;
+    use crate::map::settings::MapSettings;
     use crate::voxel::{VoxelSet, quantize};
 
     /// Points of a cube of 60 voxels, on borders too, and some that no voxel holds.

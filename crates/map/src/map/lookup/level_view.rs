@@ -1,8 +1,7 @@
 //! What a look-up at one level reads.
 
 use crate::bloom::CountingBloomFilter;
-use crate::map::OccupiedVoxelList;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::{OccupiedVoxelList, SHARDS};
 use crate::util::Keyword;
 use crate::voxel::Slots;
 

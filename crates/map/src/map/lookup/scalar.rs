@@ -4,10 +4,10 @@
 use super::level_view::{LevelView, Lookup};
 use crate::bloom::Probe;
 use crate::geometry::Point;
-use crate::map::sharding::shard_of_region;
+use crate::map::shards::shard_of_region;
 use crate::voxel::{Cell, LatticeFromPoints, VoxelKey};
 
-/// See [`super::occupied`].
+/// See [`super::by_point::occupied`].
 pub(super) fn occupied(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,

@@ -1,7 +1,7 @@
 //! What a trajectory knows of scans by their ids, those among them whose poses are not stored.
 
 use super::scan::MappedScan;
-use crate::map::SessionName;
+use crate::map::name::SessionName;
 
 /// What a map knows of a scan by its robot, session and id.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -18,8 +18,9 @@ pub use lost_robots::{LOST_ROBOTS_MAX, LostRobots, SearchTask};
 
 use std::time::{Duration, Instant};
 
-use super::guess::last_seen;
-use super::{Guess, LocatedScan, MappingError, Scan, ScanMapper};
+use super::error::MappingError;
+use super::guess::{Guess, last_seen};
+use super::{LocatedScan, Scan, ScanMapper};
 use crate::align::localize::{Gravity, LocalizationSettings};
 use crate::align::{Alignment, AlignmentSettings, MultiStartSettings, PosePrior, Verdict, align_until};
 use crate::geometry::{Point, Pose, pose_difference, translation_m};

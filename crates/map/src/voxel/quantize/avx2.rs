@@ -9,7 +9,7 @@ use std::arch::x86_64::*;
 use super::NO_KEY;
 use crate::geometry::Point;
 use crate::util::cpu::Avx2;
-use crate::voxel::LatticeFromPoints;
+use crate::voxel::lattice::LatticeFromPoints;
 
 /// Points of one f32 register.
 pub const LANES: usize = 8;

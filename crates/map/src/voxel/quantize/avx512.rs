@@ -9,7 +9,8 @@ use std::arch::x86_64::*;
 use super::NO_KEY;
 use crate::geometry::Point;
 use crate::util::cpu::Avx512;
-use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
+use crate::voxel::key::{INDEX_MAX, INDEX_MIN};
+use crate::voxel::lattice::LatticeFromPoints;
 
 /// Points of one f32 register.
 pub const LANES: usize = 16;

@@ -9,7 +9,7 @@ pub mod avx2;
 pub mod avx512;
 mod scalar;
 
-use super::LatticeFromPoints;
+use super::lattice::LatticeFromPoints;
 use crate::geometry::Point;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
@@ -39,7 +39,7 @@ pub fn keys(points: &[Point], lattice_from_points: &LatticeFromPoints, level: u3
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::voxel::Lattice;
+    use crate::voxel::lattice::Lattice;
     use proptest::prelude::*;
 
     type Keys = fn(&[Point], &LatticeFromPoints, u32, &mut [u64]);

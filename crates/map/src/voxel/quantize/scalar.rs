@@ -2,7 +2,8 @@
 
 use super::NO_KEY;
 use crate::geometry::Point;
-use crate::voxel::{LatticeFromPoints, VoxelKey};
+use crate::voxel::key::VoxelKey;
+use crate::voxel::lattice::LatticeFromPoints;
 
 /// See [`super::keys`].
 pub(super) fn keys(points: &[Point], lattice_from_points: &LatticeFromPoints, level: u32, keys: &mut [u64]) {

@@ -3,7 +3,7 @@
 use super::bloom::Planes;
 use super::kernel::{BATCH, Batch, LookupKernel};
 use crate::map::lookup::level_view::LevelView;
-use crate::map::sharding::shard_of_region;
+use crate::map::shards::shard_of_region;
 use crate::util::cpu::Avx2;
 use crate::voxel::VoxelKey;
 use crate::voxel::quantize::NO_KEY;

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::kernel::{BATCH, Batch, LookupKernel};
 use super::registers::{mix, of_shards, pack, prefetch, scale, store};
 use crate::map::lookup::level_view::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::voxel::quantize::avx2::LANES;
 use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, CLUSTER_LEVELS, Cell, Cluster, Slots};
 

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::kernel::Batch;
 use crate::geometry::Point;
 use crate::map::lookup::level_view::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::voxel::LatticeFromPoints;
 use crate::voxel::quantize::avx2::{LANES, Quantizer};
 

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::kernel::BATCH;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::util;
 use crate::voxel::quantize::avx2::pack_four;
 

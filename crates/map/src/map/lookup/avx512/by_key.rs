@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::bloom::{BloomRegisters, Located};
 use super::kernel::{GROUPS, WORD};
 use crate::map::lookup::level_view::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::util::cpu::Avx512;
 use crate::voxel::quantize::NO_KEY;
 use crate::voxel::quantize::avx512::{LANES, lanes};

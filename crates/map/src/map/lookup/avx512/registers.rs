@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::util;
 use crate::voxel::quantize::avx512::LANES;
 
