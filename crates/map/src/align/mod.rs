@@ -19,8 +19,10 @@ mod multi_start;
 mod overlap;
 mod prior;
 mod refine;
+mod sampled_scan;
 mod settings;
 mod slide;
+mod stages;
 mod verdict;
 
 pub use free_space::{Contradiction, FreeSpaceSettings};
@@ -35,39 +37,9 @@ pub use verdict::{Alignment, Verdict};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
-use crate::voxel::volumetric_sample_until;
-use ascent::{Ascent, Steps};
-use extent::within_extent;
-use information::root_mean_square_range_m;
-use overlap::{Overlap, level_overlaps_until};
-use refine::{refine, surface_fit};
-use slide::Slide;
-use verdict::Fit;
-
-/// A scan and the samples that its alignment reads.
-#[derive(Debug)]
-struct SampledScan<'a> {
-    /// All points of the scan: sensor frame, meters, finite.
-    points: &'a [Point],
-    /// Volumetric sample of about 1000 points, for the ascent (paper III-A).
-    sample: Vec<Point>,
-    /// Volumetric sample of about 5000 points, for the refinement and the verdict.
-    surface_sample: Vec<Point>,
-    /// Ends the alignment early; every climb checks it.
-    stop: StopSignal<'a>,
-}
-
-impl<'a> SampledScan<'a> {
-    /// 1) Take a volumetric sample of points: of those that can be on a map that reaches as far as `extent_m`.
-    fn new(points: &'a [Point], extent_m: f64, settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
-        let near = within_extent(points, extent_m, stop);
-        let wish = settings.refinement.sample_points.max(settings.sample_points);
-        let fine = volumetric_sample_until(&near, wish, settings.seed, stop);
-        let sample =
-            volumetric_sample_until(&fine.points, settings.sample_points, settings.seed, stop).points;
-        Self { points, sample, surface_sample: fine.points, stop }
-    }
-}
+use ascent::Ascent;
+use sampled_scan::SampledScan;
+use stages::{climb, climb_sub_voxel, finish, fit};
 
 /// Finds the pose of a scan by sequential multi-resolution alignment (paper III-B), from the guess `guess`
 /// (map_from_sensor).
@@ -164,84 +136,6 @@ pub fn ascend(
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose
-}
-
-/// 2) - 4) Align iteratively at each level, coarse to fine, each from where the coarser one ended.
-fn climb(
-    voxels: &dyn OccupiedVoxels,
-    scan: &SampledScan<'_>,
-    guess: Pose,
-    coarsest: u32,
-    settings: &AlignmentSettings,
-) -> Ascent {
-    let mut ascent = Ascent::from(guess);
-    for level in (0..=coarsest).rev() {
-        let overlap = Overlap::new(voxels, &scan.sample, level, settings.lookup);
-        let steps = Steps::of_level(level, voxels.lattice(), settings);
-        ascent.climb(&overlap, steps, settings.iterations_per_level_max, scan.stop);
-    }
-    ascent
-}
-
-/// 5) Sub-voxel alignment: with all points and small steps.
-fn climb_sub_voxel(
-    voxels: &dyn OccupiedVoxels,
-    scan: &SampledScan<'_>,
-    ascent: &mut Ascent,
-    settings: &AlignmentSettings,
-) {
-    let overlap = Overlap::new(voxels, scan.points, 0, settings.lookup);
-    for halvings in 0..=settings.sub_voxel_halvings {
-        let steps = Steps::sub_voxel(voxels.lattice(), settings).halved(halvings);
-        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max, scan.stop);
-    }
-}
-
-/// 5) as in the paper, or by [`refine`] in its place where the map keeps moments; and a verdict.
-fn finish(
-    map: &MultiResolutionMap,
-    scan: &SampledScan<'_>,
-    mut ascent: Ascent,
-    settings: &AlignmentSettings,
-) -> Alignment {
-    let climbed = ascent.pose;
-    match settings.method {
-        Method::Refined if map.settings().moments => {
-            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.stop);
-            ascent.pose = refined.map_from_sensor;
-            ascent.iterations += refined.iterations;
-        }
-        Method::Refined | Method::Overlap => climb_sub_voxel(map, scan, &mut ascent, settings),
-    }
-    let (meters, degrees) = pose_difference(&climbed, &ascent.pose);
-    fit(
-        map,
-        scan,
-        ascent,
-        meters + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample),
-        settings,
-    )
-    .judged(map, settings)
-}
-
-/// Measures how a scan fits at the end of an ascent, which the last stage moved by `refined_by_m`.
-fn fit(
-    map: &MultiResolutionMap,
-    scan: &SampledScan<'_>,
-    ascent: Ascent,
-    refined_by_m: f64,
-    settings: &AlignmentSettings,
-) -> Fit {
-    let keeps_moments = map.settings().moments;
-    Fit {
-        map_from_sensor: ascent.pose,
-        refined_by_m,
-        slide: if keeps_moments { None } else { Slide::of(map, scan, &ascent.pose, settings) },
-        level_overlaps: level_overlaps_until(map, scan.points, &ascent.pose, scan.stop),
-        surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement, scan.stop),
-        iterations: ascent.iterations,
-        lookups: ascent.lookups,
-    }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::SampledScan;
 use super::overlap::Overlap;
+use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
 use crate::geometry::Pose;
 use crate::map::MultiResolutionMap;

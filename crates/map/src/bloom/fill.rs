@@ -4,12 +4,12 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod scalar;
 
 use super::counters::Counters;
-use super::probe::Probe;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
-use crate::util::prefetch;
+use scalar::fill_scalar;
 
 /// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
 pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
@@ -20,25 +20,6 @@ pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys
         return avx2::fill(cpu, plane, counters, hashes, keys);
     }
     fill_scalar(plane, counters, hashes, keys);
-}
-
-/// Keys whose words and counters are fetched at once: their cache misses are under way together.
-const AT_ONCE: usize = 16;
-
-/// The reference implementation.
-fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
-    for keys in keys.chunks(AT_ONCE) {
-        let mut probes = [Probe::default(); AT_ONCE];
-        for (probe, &key) in probes.iter_mut().zip(keys) {
-            *probe = Probe::of(key, hashes, plane.len());
-            prefetch(counters.of_word(probe.word));
-            prefetch(&plane[probe.word]);
-        }
-        for &probe in &probes[..keys.len()] {
-            counters.count_in(probe);
-            plane[probe.word] |= probe.mask;
-        }
-    }
 }
 
 #[cfg(test)]

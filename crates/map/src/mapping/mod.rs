@@ -10,8 +10,15 @@ mod deskew;
 mod error;
 mod filtered_points;
 mod guess;
+mod located_scan;
+mod lost_robots;
+mod map_scan;
 mod ray_ends;
+mod recovered;
 mod recovery;
+mod recovery_settings;
+mod resolved_guess;
+mod scan;
 mod sightings;
 mod stationary;
 mod viewpoints;
@@ -24,24 +31,26 @@ pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
+pub use located_scan::{LocatedScan, ScanOutcome};
+pub use lost_robots::{LOST_ROBOTS_MAX, LostRobots, SearchTask};
 pub use ray_ends::RayEnds;
-pub use recovery::{LOST_ROBOTS_MAX, LostRobots, Recovered, RecoverySettings, SearchTask};
+pub use recovered::Recovered;
+pub use recovery_settings::RecoverySettings;
+pub use scan::Scan;
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
 pub use viewpoints::{VIEWPOINT_BYTES_MAX_DEFAULT, ViewpointSettings};
 
 use std::borrow::Cow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::align::localize::Gravity;
-use crate::align::{
-    Alignment, AlignmentSettings, PoseCovariance, PosePrior, Verdict, align_until, evaluate_at_until,
-};
+use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
 use crate::geometry::{Point, Pose, Twist};
-use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
+use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 use crate::util::StopSignal;
 use carving::CarvingScan;
-use recovery::Recovery;
+use recovery_settings::Recovery;
+use resolved_guess::last_seen;
 use viewpoints::SeenScan;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
@@ -88,174 +97,10 @@ pub struct MappingSettings {
     pub carving: Option<CarvingSettings>,
 }
 
-/// A scan to map.
-#[derive(Debug, Clone)]
-pub struct Scan<'a> {
-    /// The robot that took it.
-    pub robot: &'a RobotName,
-    /// The run of the robot's software that sent it.
-    pub session: SessionName,
-    /// The robot's own number of the scan, unique in its session.
-    pub scan_id: Option<u64>,
-    /// When the scan was taken, nanoseconds since the Unix epoch.
-    pub timestamp_ns: Option<i64>,
-    /// The scan's points in the sensor frame, meters, all of them finite.
-    pub points: &'a [Point],
-    /// When each of the points was measured, seconds from `timestamp_ns` (negative before it), where the sensor moved
-    /// meanwhile: the scan is deskewed. As many as points; none where they were measured at once.
-    pub times_s: Option<&'a [f32]>,
-    /// Up to where nothing was met in other directions: they are seen through, and no voxels.
-    pub no_returns: RayEnds<'a>,
-    /// Where rays ended at the robot itself: no voxels, and what lies behind them was not seen.
-    pub of_robot: RayEnds<'a>,
-    /// Points that were left out before, see [`FilteredPoints`].
-    pub points_skipped: usize,
-    /// Direction of gravity, as an accelerometer tells.
-    pub gravity: Option<Gravity>,
-    /// Where it is thought to have been taken.
-    pub guess: Guess,
-    /// How far off the guess may be.
-    pub guess_covariance: Option<PoseCovariance>,
-    /// The guess is taken as it is, without aligning.
-    pub at_guess: bool,
-    /// Insert the scan where it was found even if it does not fit there.
-    pub force: bool,
-    /// Digest of the request, which tells the same scan sent again from another one under its id.
-    pub digest: u64,
-}
-
-impl<'a> Scan<'a> {
-    /// The points in the sensor frame at the scan's timestamp, where the sensor moved with `velocity`.
-    fn points_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-        RayEnds { points: self.points, times_s: self.times_s }.at(velocity)
-    }
-
-    /// [`Scan::points_at`], and where rays ended at the robot itself: all that stood in the way of one.
-    fn met_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-        let mut met = self.points_at(velocity);
-        if !self.of_robot.points.is_empty() {
-            met.to_mut().extend_from_slice(&self.of_robot.at(velocity));
-        }
-        met
-    }
-
-    /// How far the sensor moved with `velocity`, at most, between the scan's timestamp and a ray, meters.
-    fn moved_m(&self, velocity: Option<&Twist>) -> f64 {
-        let points = RayEnds { points: self.points, times_s: self.times_s };
-        [points, self.no_returns, self.of_robot]
-            .map(|ends| ends.moved_m(velocity))
-            .into_iter()
-            .fold(0.0, f64::max)
-    }
-
-    /// What is known of its pose, where it is thought to have been taken at `guess` (map_from_sensor).
-    fn prior(&self, guess: Pose) -> PosePrior {
-        PosePrior { guess, covariance: self.guess_covariance, gravity: self.gravity }
-    }
-
-    /// A scan without number and time, thought to have been taken at the robot's last pose.
-    ///
-    /// `points` are in the sensor frame and finite.
-    pub fn new(robot: &'a RobotName, points: &'a [Point]) -> Self {
-        Self {
-            robot,
-            session: SessionName::default(),
-            scan_id: None,
-            timestamp_ns: None,
-            points,
-            times_s: None,
-            no_returns: RayEnds::default(),
-            of_robot: RayEnds::default(),
-            points_skipped: 0,
-            gravity: None,
-            guess: Guess::Last,
-            guess_covariance: None,
-            at_guess: false,
-            force: false,
-            digest: 0,
-        }
-    }
-}
-
-/// Where a scan was found to have been taken.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LocatedScan {
-    /// The pose that its guess stood for.
-    pub guess: Pose,
-    /// The pose, and how well the scan fits the map there.
-    pub alignment: Alignment,
-    /// How long it took to find it.
-    pub align_time: Duration,
-    /// The map was empty, so that the scan went to its guess. Who inserts it must see to it that the map is still empty
-    /// then, or locate it again.
-    pub is_first: bool,
-    /// The velocity of the sensor that its points were deskewed with; none of points that were measured at once, or
-    /// where the velocity is not known.
-    pub velocity: Option<Twist>,
-    /// How its robot, which was lost, was found again; none of a scan that fits from its own guess, or nowhere.
-    pub recovered: Option<Recovered>,
-}
-
-impl LocatedScan {
-    /// True of a scan that fits the map.
-    pub fn is_accepted(&self) -> bool {
-        self.alignment.verdict == Verdict::Accepted
-    }
-}
-
-/// What became of a scan.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanOutcome {
-    /// Where it was found.
-    pub located: LocatedScan,
-    /// The change that it made to the map; none of a scan that was refused, or whose robot stands still.
-    pub committed: Option<Committed>,
-    /// How long recording and inserting it took.
-    pub insert_time: Duration,
-}
-
-impl ScanOutcome {
-    /// True of a scan that is in the map.
-    pub fn is_inserted(&self) -> bool {
-        self.committed.is_some()
-    }
-}
-
 impl<'a> ScanMapper<'a> {
     /// A mapper of scans into `map`, whose robots were seen as `sightings` tells.
     pub fn new(map: &'a MultiResolutionMap, sightings: &'a Sightings, settings: MappingSettings) -> Self {
         Self { map, sightings, settings, recovery: None }
-    }
-
-    /// Maps one scan: aligns it to the map from its guess and, where it fits, adds all its points (paper III-B).
-    ///
-    /// A scan that does not fit is an answer and no error: the map is as it was.
-    ///
-    /// # Errors
-    /// The guess needs a pose that is not there, no point lies within the map's range, or `stop` said so; the map is as
-    /// it was.
-    pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
-        let located = self.locate(scan, stop)?;
-        let located = self.recover(scan, located, stop)?;
-        if !located.is_accepted() {
-            self.search_at_once(scan, stop);
-        }
-        let located = self.told(scan, located);
-        self.sightings.note(scan, &located);
-        if !located.is_accepted() && !scan.force {
-            return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
-        }
-        let start = Instant::now();
-        let mut record = self.record(scan, &located, stop)?;
-        let carving = self.carve(scan, &located, &record, stop)?;
-        record.carved.clone_from(&carving.voxels);
-        let is_new = !self.note_stationary(scan, &record);
-        let committed = is_new.then(|| {
-            let committer = self.map.committer();
-            record.carved = carving.at(self.map.revision());
-            committer.insert_scan(record)
-        });
-        Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
     }
 
     /// This mapper, which looks from one start alone, for no lost robot, and for some 30 ms: the answer holds where it is
@@ -331,7 +176,7 @@ impl<'a> ScanMapper<'a> {
     /// was seen last. None where a time or the last pose is not known.
     fn velocity(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> Option<Twist> {
         scan.times_s?;
-        let (last, last_ns) = guess::last_seen(scan.robot, &self.map.trajectory(), self.sightings)?;
+        let (last, last_ns) = last_seen(scan.robot, &self.map.trajectory(), self.sightings)?;
         self.settings.deskew.velocity((&last, last_ns), (map_from_sensor, scan.timestamp_ns))
     }
 

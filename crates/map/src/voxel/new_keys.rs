@@ -6,12 +6,13 @@ mod append;
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod scalar;
 
-use super::block::{BLOCK_LEVELS, BlockMask, OFFSETS};
+use super::block::{BLOCK_LEVELS, BlockMask};
 use super::key::VoxelKey;
-use crate::util::bits::for_each_bit;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
+use scalar::keys_gained_scalar;
 
 impl BlockMask {
     /// Appends to `keys` those of the voxels of `block`, `up` (0, 1 or 2) levels up in it, that are occupied with the
@@ -26,14 +27,6 @@ impl BlockMask {
             return avx2::keys_gained(cpu, self, added, first, up, keys);
         }
         keys_gained_scalar(self, added, first, up, keys);
-    }
-}
-
-/// The reference implementation; `first` is the key of the block's first voxel of the level.
-fn keys_gained_scalar(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
-    let gained = before.union(added).coarsened(up).difference(&before.coarsened(up));
-    for (word, offsets) in gained.0.into_iter().zip(OFFSETS.chunks_exact(u64::BITS as usize)) {
-        for_each_bit(word, |bit| keys.push(first + offsets[bit as usize]));
     }
 }
 

@@ -101,3 +101,18 @@ pub enum LocalizationError {
         bytes_max: usize,
     },
 }
+
+impl Localization {
+    /// The answer of a search that was stopped before its data structures were built.
+    pub(super) fn cut_short_at_once(version: ContentVersion) -> Self {
+        Self {
+            verdict: Verdict::Ambiguous,
+            reason: "the search was cut short before it began".into(),
+            candidates: Vec::new(),
+            exhaustive: false,
+            cut_short: true,
+            cells: 0,
+            version,
+        }
+    }
+}

@@ -37,9 +37,8 @@ pub use supervision::Supervision;
 
 use super::extent::within_extent;
 use super::settings::AlignmentSettings;
-use super::verdict::Verdict;
 use crate::geometry::Point;
-use crate::map::{ContentVersion, MultiResolutionMap};
+use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 use crate::voxel::sample_bytes_max;
 use basins::Basins;
@@ -152,21 +151,6 @@ fn search_and_refine(
         cells: found.cells,
         version: levels.version,
     })
-}
-
-impl Localization {
-    /// The answer of a search that was stopped before its data structures were built.
-    fn cut_short_at_once(version: ContentVersion) -> Self {
-        Self {
-            verdict: Verdict::Ambiguous,
-            reason: "the search was cut short before it began".into(),
-            candidates: Vec::new(),
-            exhaustive: false,
-            cut_short: true,
-            cells: 0,
-            version,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::cell::{Cell, RefCell};
 
 use super::*;
+use crate::align::Verdict;
 use crate::geometry::Pose;
 use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
 

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU8;
 
-use super::cap::{DISTANCE_CAP_MAX, margin_of};
+use super::cap::margin_of;
 use super::rows::FAR;
 use super::transform::Transform;
 use crate::map::regions::CellBox;
@@ -74,6 +74,7 @@ fn quarters_up_to(cap: NonZeroU8) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::distance_block::cap::DISTANCE_CAP_MAX;
     use crate::map::distance_block::transform::STEPS_PER_LOOK;
     use crate::voxel::{INDEX_MIN, Lattice, VoxelKey};
     use proptest::prelude::*;

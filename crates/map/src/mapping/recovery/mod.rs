@@ -10,97 +10,27 @@
 //! A robot may be found in the wrong one of two places that look the same only if the other lies beyond where it can
 //! be: see [`RecoverySettings::distance_min_m`].
 
-mod lost_robots;
 mod motion;
 mod search;
 
-pub use lost_robots::{LOST_ROBOTS_MAX, LostRobots, SearchTask};
+use std::time::Instant;
 
-use std::time::{Duration, Instant};
-
+use super::ScanMapper;
 use super::error::MappingError;
-use super::guess::{Guess, last_seen};
-use super::{LocatedScan, Scan, ScanMapper};
-use crate::align::localize::{Gravity, LocalizationSettings};
+use super::guess::Guess;
+use super::located_scan::LocatedScan;
+use super::resolved_guess::last_seen;
+use super::scan::Scan;
+use crate::align::localize::Gravity;
 use crate::align::{Alignment, AlignmentSettings, MultiStartSettings, PosePrior, Verdict, align_until};
 use crate::geometry::{Point, Pose, pose_difference, translation_m};
 use crate::map::RobotName;
-use crate::util::{Keyword, StopSignal};
+use crate::mapping::lost_robots::{LostRobot, LostRobots, LostSince, RefusedScan};
+use crate::mapping::recovered::Recovered;
+use crate::mapping::recovery_settings::{Recovery, RecoverySettings};
+use crate::util::StopSignal;
 use crate::voxel::volumetric_sample_until;
-use lost_robots::{LostRobot, LostSince, RefusedScan};
 use motion::motion_between;
-
-/// When and how a lost robot is looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RecoverySettings {
-    /// Approximate number of points that are kept of a refused scan. 20,000.
-    pub points_kept: usize,
-    /// A scan is where its motion since the scan before it leads if it is found within so many r_0 of that. 6.
-    pub agreement: f64,
-    /// And turned by no more than this, degrees. 5.
-    pub agreement_deg: f64,
-    /// How a robot is searched for of which nothing is known, and what a place has to fulfill.
-    pub localization: LocalizationSettings,
-    /// How far from its last good pose a robot is looked for at least, meters. 20.
-    pub distance_min_m: f64,
-    /// How fast the distance grows in which it is looked for, with the time since its last good pose, meters a second.
-    /// 5. Where scans have no timestamps, the whole map is searched.
-    pub speed_max_m_per_s: f64,
-    /// Every other search, the first among them, takes the sensor to be as upright as at its last good pose, which takes a
-    /// tenth of the time. False.
-    pub keeps_tilt: bool,
-    /// Shortest time between two searches for the same robot. 0.
-    pub search_interval: Duration,
-}
-
-impl Default for RecoverySettings {
-    fn default() -> Self {
-        Self {
-            points_kept: 20_000,
-            agreement: 6.0,
-            agreement_deg: 5.0,
-            localization: LocalizationSettings::default(),
-            distance_min_m: 20.0,
-            speed_max_m_per_s: 5.0,
-            keeps_tilt: false,
-            search_interval: Duration::ZERO,
-        }
-    }
-}
-
-/// How a robot was found again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recovered {
-    /// From its last good pose.
-    LastPose,
-    /// From where constant velocity leads.
-    ConstantVelocity,
-    /// From where its refused scans lead, aligned one to the other.
-    ChainedScans,
-    /// By a search with no guess, which two scans confirm.
-    Localization,
-}
-
-impl Keyword for Recovered {
-    const ALL: &'static [Self] =
-        &[Self::LastPose, Self::ConstantVelocity, Self::ChainedScans, Self::Localization];
-
-    fn as_str(self) -> &'static str {
-        match self {
-            Self::LastPose => "last_pose",
-            Self::ConstantVelocity => "constant_velocity",
-            Self::ChainedScans => "chained_scans",
-            Self::Localization => "localization",
-        }
-    }
-}
-
-/// Lost robots, and how they are looked for.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Recovery<'a> {
-    pub(super) lost: &'a LostRobots,
-    pub(super) settings: RecoverySettings,
-}
 
 /// A pose from which a refused scan is aligned again.
 type OtherGuess = (Recovered, Pose);

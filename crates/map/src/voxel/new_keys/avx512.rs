@@ -12,7 +12,7 @@ use crate::voxel::block::BlockMask;
 /// Cells a step: one register of keys.
 const LANES: usize = 8;
 
-/// See [`super::keys_gained_scalar`].
+/// See [`super::scalar::keys_gained_scalar`].
 #[inline]
 pub(super) fn keys_gained(
     _: Avx512,

@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::NO_KEY;
+use super::scalar::NO_KEY;
 use crate::geometry::Point;
 use crate::util::cpu::Avx2;
 use crate::voxel::lattice::LatticeFromPoints;

@@ -9,13 +9,12 @@ pub mod avx2;
 pub mod avx512;
 mod scalar;
 
+pub use scalar::NO_KEY;
+
 use super::lattice::LatticeFromPoints;
 use crate::geometry::Point;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
-
-/// Stands among keys for a point that has no voxel; no key sets bit 63.
-pub const NO_KEY: u64 = u64::MAX;
 
 /// Packed keys (`VoxelKey::to_bits`) of the voxels of `level` that points fall in, [`NO_KEY`] for a point without a voxel
 /// (not finite, out of range). `keys[i]` is that of `points[i]`.

@@ -4,16 +4,15 @@
 
 mod ascii;
 mod binary;
+mod vertex;
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
+use ply_rs_bw::ply::{Encoding, Header};
 
-use super::{HEADER_BYTES_MAX, Problem, check_count, quoted};
+use super::error::{Problem, quoted};
+use super::supported::HEADER_BYTES_MAX;
 use crate::geometry::Point;
-
-const VERTEX: &str = "vertex";
-/// Fewest bytes of one ascii value: a digit and a separator.
-const ASCII_VALUE_BYTES_MIN: u64 = 2;
+use vertex::vertex;
 
 /// The points of a `.ply` file.
 pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
@@ -61,45 +60,4 @@ fn check_names(header: &Header, header_bytes: &[u8]) -> Result<(), Problem> {
         return Err(Problem::new("the header declares an element or property name twice"));
     }
     Ok(())
-}
-
-/// Element `vertex`, which has x, y and z as float or double.
-fn vertex(header: &Header) -> Result<&ElementDef, Problem> {
-    let vertex =
-        header.elements.get(VERTEX).ok_or_else(|| Problem::new("no element vertex in the header"))?;
-    for name in ["x", "y", "z"] {
-        match vertex.properties.get(name).map(|property| &property.data_type) {
-            Some(PropertyType::Scalar(ScalarType::Float | ScalarType::Double)) => {}
-            Some(other) => {
-                return Err(Problem::new(format!(
-                    "property {name} of element vertex is {other:?}, float or double is needed"
-                )));
-            }
-            None => return Err(Problem::new(format!("element vertex has no property {name}"))),
-        }
-    }
-    Ok(vertex)
-}
-
-/// The elements before `vertex`, whose entries lie before its own.
-fn before_vertex(header: &Header) -> impl Iterator<Item = &ElementDef> {
-    header.elements.values().take_while(|element| element.name != VERTEX)
-}
-
-fn check_element(element: &ElementDef, encoding: Encoding, have: usize) -> Result<(), Problem> {
-    let types = element.properties.values().map(|property| &property.data_type);
-    let entry_bytes = types.map(|data_type| value_bytes_min(data_type, encoding)).sum();
-    check_count(&format!("{} elements", quoted(&element.name)), element.count as u64, entry_bytes, have)
-}
-
-/// Fewest bytes that a property takes; a list may be empty.
-fn value_bytes_min(data_type: &PropertyType, encoding: Encoding) -> u64 {
-    let (PropertyType::Scalar(scalar) | PropertyType::List(scalar, _)) = data_type;
-    match scalar {
-        _ if encoding == Encoding::Ascii => ASCII_VALUE_BYTES_MIN,
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    }
 }

@@ -1,17 +1,6 @@
-//! Points and poses: the nalgebra aliases and the checks every pose passes on its way in.
-//!
-//! A transform's name holds both frames, so that `p_in_map = map_from_sensor * p_in_sensor`.
+//! Poses: rigid transforms, and the checks that every one passes on its way in.
 
-mod twist;
-
-pub use twist::Twist;
-
-use bytemuck::{Pod, Zeroable};
-use nalgebra::allocator::Allocator;
-use nalgebra::{
-    DefaultAllocator, DimDiff, DimSub, Isometry3, OMatrix, Quaternion, SymmetricEigen, Translation3, U1,
-    UnitQuaternion, Vector3,
-};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// A rigid transform in meters, double precision, named `a_from_b` wherever it appears.
 pub type Pose = Isometry3<f64>;
@@ -22,63 +11,6 @@ pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-3;
 /// How far a quaternion's norm may lie from one by rounding alone. Such a quaternion is left as it is, so that a pose
 /// that is sent or stored comes back bit for bit.
 pub const QUATERNION_NORM_ROUNDING: f64 = 1e-9;
-
-/// A point of three little-endian f32 (x, y, z in meters): the wire form *is* the memory form.
-///
-/// It has alignment 1, so that the bytes of a request, at whatever address the network left them, are a
-/// `&[Point]` without a copy.
-#[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-#[repr(transparent)]
-pub struct Point([[u8; 4]; 3]);
-
-impl Point {
-    /// Bytes of one point on the wire and in memory.
-    pub const BYTES: usize = 12;
-
-    /// The point (x, y, z), meters.
-    #[inline]
-    pub fn new(x: f32, y: f32, z: f32) -> Self {
-        Self([x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes()])
-    }
-
-    /// The coordinates \[x, y, z\], meters.
-    #[inline]
-    pub fn xyz(self) -> [f32; 3] {
-        self.0.map(f32::from_le_bytes)
-    }
-
-    /// True when no coordinate is NaN or infinite. Depth cameras use NaN for "no return".
-    #[inline]
-    pub fn is_finite(self) -> bool {
-        self.xyz().iter().all(|c| c.is_finite())
-    }
-
-    /// The point in double precision.
-    #[inline]
-    pub fn to_f64(self) -> nalgebra::Point3<f64> {
-        self.xyz().map(f64::from).into()
-    }
-}
-
-impl From<[f32; 3]> for Point {
-    #[inline]
-    fn from([x, y, z]: [f32; 3]) -> Self {
-        Self::new(x, y, z)
-    }
-}
-
-impl From<nalgebra::Point3<f64>> for Point {
-    fn from(p: nalgebra::Point3<f64>) -> Self {
-        Self::new(p.x as f32, p.y as f32, p.z as f32)
-    }
-}
-
-impl std::fmt::Debug for Point {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let [x, y, z] = self.xyz();
-        write!(f, "({x}, {y}, {z})")
-    }
-}
 
 /// Why numbers are not a pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -155,36 +87,9 @@ pub fn is_finite(pose: &Pose) -> bool {
     numbers.copied().all(f64::is_finite)
 }
 
-/// Iterations after which no eigenvalue of a symmetric matrix is waited for; of finite numbers a few dozen do.
-const EIGEN_ITERATIONS_MAX: usize = 1000;
-
-/// Eigenvalues and eigenvectors of a symmetric matrix; none where a number is not finite, or they do not come within
-/// [`EIGEN_ITERATIONS_MAX`] iterations (nalgebra itself would go on for ever, its issue 1025).
-pub(crate) fn symmetric_eigen<D>(matrix: OMatrix<f64, D, D>) -> Option<SymmetricEigen<f64, D>>
-where
-    D: DimSub<U1>,
-    DefaultAllocator: Allocator<D, D> + Allocator<D> + Allocator<DimDiff<D, U1>>,
-{
-    if !matrix.iter().all(|number| number.is_finite()) {
-        return None;
-    }
-    let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS_MAX)?;
-    let finite = eigen.eigenvalues.iter().chain(eigen.eigenvectors.iter()).all(|number| number.is_finite());
-    finite.then_some(eigen)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, Matrix6};
-
-    #[test]
-    fn bytes_at_any_address_are_points() {
-        let mut bytes = vec![0u8];
-        bytes.extend([1.5f32, -2.0, 3.25].iter().flat_map(|c| c.to_le_bytes()));
-        let points: &[Point] = bytemuck::cast_slice(&bytes[1..]);
-        assert_eq!(points, &[Point::new(1.5, -2.0, 3.25)]);
-    }
 
     #[test]
     fn a_pose_round_trips_through_its_parts() {
@@ -215,22 +120,6 @@ mod tests {
         }
         let (here, far) = (Pose::translation(f64::MAX, 0.0, 0.0), Pose::translation(-f64::MAX, 0.0, 0.0));
         assert_eq!(extrapolate(&here, &far, 1.0), far);
-    }
-
-    #[test]
-    fn hostile_matrices_have_eigenvalues_or_none_and_end_nothing() {
-        let of = |value: f64| Matrix3::new(value, 1.0, value, 1.0, -value, 2.0, value, 2.0, 1e-300);
-        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(symmetric_eigen(of(value)).is_none(), "{value}");
-            assert!(symmetric_eigen(Matrix6::from_element(value)).is_none(), "{value}");
-        }
-        for value in [f64::MAX, 1e300, 1e-300, f64::MIN_POSITIVE, 5e-324, 0.0, -1e155] {
-            for finite in [symmetric_eigen(of(value)), symmetric_eigen(Matrix3::from_element(value))] {
-                assert!(finite.is_none_or(|eigen| eigen.eigenvalues.iter().all(|value| value.is_finite())));
-            }
-        }
-        let usual = symmetric_eigen(Matrix3::new(2.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 5.0)).unwrap();
-        assert!((usual.eigenvalues.sum() - 9.0).abs() < 1e-12);
     }
 
     #[test]
