@@ -8,7 +8,7 @@
 //!                           Shard                all levels of one part of space (III)
 //! lookup/                   Lookup               quantize and look up, the critical path of everything (II)
 //! multi_resolution_map.rs   MultiResolutionMap   the shards, and the trajectory that is stored along (III, III-B)
-//! moments.rs                MomentsView          the moments of points, for refinement below the size of a voxel (III-B)
+//! moments.rs                MomentsView          the moments of points, on which poses are refined (III-B)
 //! view.rs                   MapView              reading, at one revision
 //! listing/, regions/                             the voxels of a level, all of them or those of a part of space
 //! change/, trajectory/      Change, Trajectory   what one revision did; the poses from which the map was seen (III-B)

@@ -16,27 +16,27 @@ use crate::voxel::{Cell, Lattice, MOMENT_LEVEL, Moments, VoxelKey};
 /// A multi-resolution occupied voxel list (MROL, paper III): level n holds the occupied voxels of
 /// r_n = r_0 * 2^n, with the trajectory of the poses from which they were seen.
 ///
-/// Space is cut into regions, and each region belongs to one of [`SHARDS`] shards with a lock of its own:
-/// readers hold the read locks of the shards they need, all at once, and so see one revision. Changes are made
-/// one at a time by a [`Committer`](super::Committer), which holds the write locks of the shards it touches until the new
-/// revision is published.
+/// Space is cut into regions, and each region belongs to one of [`SHARDS`] shards with a lock of its own: readers hold
+/// the read locks of the shards they need, all at once, and so see one revision. Changes are made one at a time by a
+/// [`Committer`](super::Committer), which holds the write locks of the shards it touches until the new revision is
+/// published.
 #[derive(Debug)]
 pub struct MultiResolutionMap {
-    pub(in crate::map) settings: MapSettings,
-    pub(in crate::map) lattice: Lattice,
-    pub(in crate::map) sharding: Sharding,
+    pub(super) settings: MapSettings,
+    pub(super) lattice: Lattice,
+    pub(super) sharding: Sharding,
     /// None of a map that keeps no moments.
-    pub(in crate::map) moments: Option<ShardedMoments>,
-    pub(in crate::map) shards: [RwLock<Shard>; SHARDS],
-    pub(in crate::map) trajectory: RwLock<Trajectory>,
-    pub(in crate::map) requests: RwLock<IdempotencyLog>,
-    pub(in crate::map) keep_outs: RwLock<Arc<KeepOuts>>,
-    pub(in crate::map) viewpoints: RwLock<Arc<ViewpointSet>>,
-    pub(in crate::map) published: Published,
-    pub(in crate::map) followers: Followers,
-    pub(in crate::map) commit_queue: Mutex<()>,
+    pub(super) moments: Option<ShardedMoments>,
+    pub(super) shards: [RwLock<Shard>; SHARDS],
+    pub(super) trajectory: RwLock<Trajectory>,
+    pub(super) requests: RwLock<IdempotencyLog>,
+    pub(super) keep_outs: RwLock<Arc<KeepOuts>>,
+    pub(super) viewpoints: RwLock<Arc<ViewpointSet>>,
+    pub(super) published: Published,
+    pub(super) followers: Followers,
+    pub(super) commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_read`].
-    pub(in crate::map) long_reads: RwLock<()>,
+    pub(super) long_reads: RwLock<()>,
 }
 
 impl MultiResolutionMap {

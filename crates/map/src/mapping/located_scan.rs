@@ -1,4 +1,4 @@
-//! Where a scan was found, and what became of it.
+//! Scans that were located, and what became of them.
 
 use std::time::Duration;
 

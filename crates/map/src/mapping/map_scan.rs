@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use super::ScanMapper;
 use super::error::MappingError;
 use super::located_scan::ScanOutcome;
 use super::scan::Scan;
+use super::scan_mapper::ScanMapper;
 use crate::util::StopSignal;
 
 impl ScanMapper<'_> {

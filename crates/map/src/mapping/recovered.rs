@@ -1,4 +1,4 @@
-//! How a robot was found again.
+//! The ways in which a lost robot is found again.
 
 use crate::util::Keyword;
 

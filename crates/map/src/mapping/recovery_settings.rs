@@ -1,4 +1,4 @@
-//! When and how lost robots are looked for.
+//! Settings of recovery.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! A scan to map.
+//! Scans as they are sent to be mapped.
 
 use std::borrow::Cow;
 
@@ -29,7 +29,7 @@ pub struct Scan<'a> {
     pub no_returns: RayEnds<'a>,
     /// Where rays ended at the robot itself: no voxels, and what lies behind them was not seen.
     pub of_robot: RayEnds<'a>,
-    /// Points that were left out before, see [`FilteredPoints`].
+    /// Points that were left out before, see [`FilteredPoints`](super::FilteredPoints).
     pub points_skipped: usize,
     /// Direction of gravity, as an accelerometer tells.
     pub gravity: Option<Gravity>,

@@ -43,7 +43,7 @@ pub struct UndoRecord {
     /// The finest voxels that come back, none of them there before.
     pub restored: VoxelSet,
     /// What the moments of the voxels that the changes touched are without them, see
-    /// [`Reversal::moments`](crate::map::voxel_ownership::Reversal::moments).
+    /// [`Reversal::moments`](crate::map::Reversal::moments).
     pub moments: MomentSet,
     /// Under which id it was asked for.
     pub request: Option<Request>,

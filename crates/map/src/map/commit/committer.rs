@@ -184,8 +184,8 @@ impl<'a> Committer<'a> {
         self.publish((committed, LevelChange::of(self.noted, [])))
     }
 
-    /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](crate::map::trajectory::Trajectory::thin); the number
-    /// of poses that went. Makes no revision. Readers go on meanwhile.
+    /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](crate::map::Trajectory::thin); the
+    /// number of poses that went. Makes no revision. Readers go on meanwhile.
     pub fn thin(self, before: u64, spacing: &TrajectorySpacing) -> usize {
         let mut thinned = self.map.trajectory();
         let gone = thinned.thin(before, spacing);

@@ -8,7 +8,8 @@ use super::{avx2, avx512};
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::VoxelKey;
 
-/// [`super::by_point::occupied`] by the filter, which must be there, of voxels of the view's level whose keys are known.
+/// The look-up of points by the filter, which must be there, of voxels of the view's level whose keys are
+/// known.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.

@@ -1,4 +1,4 @@
-//! Why numbers are not a region.
+//! Errors of regions, and how far they may reach.
 
 /// How far from the origin a sphere or an oriented box may lie and reach, meters: ten thousand times as far as the largest
 /// map goes.

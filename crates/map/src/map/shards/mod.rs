@@ -1,7 +1,7 @@
 //! Shards: the occupied voxel lists of the paper (II), and all levels of one part of space (III).
 //!
-//! Begin with [`OccupiedVoxelList`], one level, and `shard`, all of them; `sharding` cuts space into regions and deals them
-//! out to shards, `bounds` and `tier_view` serve it, `capacity_schedule` and `filter_room` say how filters grow.
+//! Begin with [`OccupiedVoxelList`], one level, and `shard`, all of them; `sharding` cuts space into regions and deals
+//! them out to shards, `bounds` and `tier_view` serve it, `capacity_schedule` and `filter_room` say how filters grow.
 
 mod bounds;
 mod capacity_schedule;

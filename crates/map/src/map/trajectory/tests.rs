@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::geometry::Pose;
-use crate::map::{RobotName, SessionName};
+use crate::map::name::{RobotName, SessionName};
 
 #[derive(Debug, Clone)]
 enum Step {

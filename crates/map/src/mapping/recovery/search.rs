@@ -9,10 +9,10 @@ use crate::align::localize::{
 };
 use crate::geometry::{Pose, translation_m};
 use crate::map::RobotName;
-use crate::mapping::ScanMapper;
 use crate::mapping::located_scan::LocatedScan;
 use crate::mapping::lost_robots::{LostRobots, SearchTask};
 use crate::mapping::scan::Scan;
+use crate::mapping::scan_mapper::ScanMapper;
 use crate::util::StopSignal;
 
 /// Candidates that a search compares: a rival is enough to say no.

@@ -1,9 +1,12 @@
 //! Truncated, corrupt and hostile files.
 
+use std::path::Path;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::*;
+use super::files::*;
+use crate::scan::reader::format::Format;
 use crate::scan::reader::supported::EXTENSIONS;
 
 #[test]

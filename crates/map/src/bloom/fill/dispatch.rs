@@ -1,18 +1,14 @@
-//! Many keys at once into a filter that nobody reads yet: most of what a map does that grows.
+//! Filling, with the widest kernel that the machine has.
 
+use super::scalar::fill_scalar;
 #[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-mod scalar;
-
-use super::counters::Counters;
+use super::{avx2, avx512};
+use crate::bloom::counters::Counters;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
-use scalar::fill_scalar;
 
 /// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
-pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
+pub(in crate::bloom) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
     #[cfg(target_arch = "x86_64")]
     if let Some(cpu) = Avx512::detect() {
         return avx512::fill(cpu, plane, counters, hashes, keys);

@@ -1,18 +1,12 @@
-//! The voxels that a block gains, as keys, level by level.
+//! New keys of a block, with the widest kernel that the machine has.
 
+use super::scalar::keys_gained_scalar;
 #[cfg(target_arch = "x86_64")]
-mod append;
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-mod scalar;
-
-use super::block::{BLOCK_LEVELS, BlockMask};
-use super::key::VoxelKey;
+use super::{avx2, avx512};
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
-use scalar::keys_gained_scalar;
+use crate::voxel::block::{BLOCK_LEVELS, BlockMask};
+use crate::voxel::key::VoxelKey;
 
 impl BlockMask {
     /// Appends to `keys` those of the voxels of `block`, `up` (0, 1 or 2) levels up in it, that are occupied with the

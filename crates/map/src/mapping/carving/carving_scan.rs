@@ -1,29 +1,13 @@
-//! Carving: what a scan saw through is no longer there, and leaves the map.
-//!
-//! A map that only grows keeps everything that ever stood or walked in it. A scan that looks through a voxel and sees what lies
-//! behind it tells that the voxel is empty now. What it tells is believed of few voxels, for a wall that is carved away is a
-//! worse map than one with a ghost in it:
-//!
-//! * never of one that the scan touches, or that lies within a margin of the surface that it shows, the surface between its
-//!   points included;
-//! * only where each direction in which the voxel lies was seen to end behind it;
-//! * never at a rim: where a direction beside these was not seen, or ends in front of the voxel on another surface. A surface
-//!   that is seen at a grazing angle is one rim beside the other, so nothing is carved in front of it or from it;
-//! * only as far as the points lie as close to each other as voxels do, or half as far again, and within a range.
+//! A scan that carves: the voxels that it saw through.
 
-mod settings;
-
-pub use settings::{
-    CARVING_GRAZING_MAX_DEG, CARVING_GRAZING_MIN_DEG, CARVING_MARGIN_MAX, CARVING_RANGE_MAX_M,
-    CarvingSettings, CarvingSettingsError,
-};
-
-use super::error::MappingError;
+use super::settings::CarvingSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::{MultiResolutionMap, Region, ScanRecord};
+use crate::mapping::error::MappingError;
 use crate::util::StopSignal;
 use crate::visibility::{ScanSurface, SurfaceSettings};
 use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
+
 /// Blocks of voxels that are looked at between two looks at the stop signal.
 const BLOCKS_PER_LOOK: usize = 16;
 /// Samples of a surface are so much closer to each other than its margins are wide, since they lie askew to the voxels.
@@ -51,18 +35,18 @@ impl Carving {
     }
 
     /// What is carved of a map that is at `revision` now: nothing where something came between.
-    pub(super) fn at(self, revision: u64) -> VoxelSet {
+    pub(in crate::mapping) fn at(self, revision: u64) -> VoxelSet {
         if self.revision == revision { self.voxels } else { VoxelSet::default() }
     }
 }
 
 /// A scan that carves, where it was found.
-pub(super) struct CarvingScan<'a> {
+pub(in crate::mapping) struct CarvingScan<'a> {
     /// All that stood in the way of a ray, the robot itself too (sensor frame, finite).
-    pub(super) points: &'a [Point],
-    pub(super) record: &'a ScanRecord,
+    pub(in crate::mapping) points: &'a [Point],
+    pub(in crate::mapping) record: &'a ScanRecord,
     /// How far the sensor moved while the points were measured, meters.
-    pub(super) moved_m: f64,
+    pub(in crate::mapping) moved_m: f64,
 }
 
 impl CarvingScan<'_> {
@@ -70,7 +54,7 @@ impl CarvingScan<'_> {
     ///
     /// # Errors
     /// When `stop` said so.
-    pub(super) fn carve(
+    pub(in crate::mapping) fn carve(
         &self,
         map: &MultiResolutionMap,
         settings: &CarvingSettings,
@@ -181,6 +165,3 @@ impl Sight<'_> {
         })
     }
 }
-
-#[cfg(test)]
-mod tests;
