@@ -14,7 +14,7 @@ const KERNELS: [&str; 9] = [
     "crates/map/src/voxel/quantize",
     "crates/map/src/voxel/new_keys",
     "crates/map/src/bloom/fill",
-    "crates/map/src/map/bounds.rs",
+    "crates/map/src/map/shards/bounds.rs",
     "crates/map/src/map/lookup",
     "crates/map/src/planning/simd.rs",
     "crates/map/src/planning/rays/interleaved.rs",

@@ -2,8 +2,8 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
-use super::AlignmentSettings;
 use super::overlap::Overlap;
+use super::settings::AlignmentSettings;
 use crate::geometry::Pose;
 use crate::util::StopSignal;
 use crate::voxel::Lattice;

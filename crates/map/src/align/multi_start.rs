@@ -6,7 +6,11 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::ascent::Ascent;
 use super::overlap::Overlap;
-use super::{Alignment, AlignmentSettings, PosePrior, SampledScan, Verdict, climb, finish};
+use super::prior::PosePrior;
+use super::sampled_scan::SampledScan;
+use super::settings::AlignmentSettings;
+use super::stages::{climb, finish};
+use super::verdict::{Alignment, Verdict};
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;

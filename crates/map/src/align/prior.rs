@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector6};
 
-use super::AlignmentSettings;
 use super::gravity::Gravity;
+use super::settings::AlignmentSettings;
 use crate::geometry::Pose;
 
 /// What is known of a scan's pose beforehand: where it is thought to have been taken, how far off that may be, and which

@@ -1,6 +1,6 @@
 //! Settings of the alignment.
 
-use super::FreeSpaceSettings;
+use super::free_space::FreeSpaceSettings;
 use crate::map::Lookup;
 use crate::util::Keyword;
 

@@ -7,7 +7,8 @@
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::overlap::Overlap;
-use super::{AlignmentSettings, SampledScan};
+use super::sampled_scan::SampledScan;
+use super::settings::AlignmentSettings;
 use crate::geometry::Pose;
 use crate::map::MultiResolutionMap;
 

@@ -1,11 +1,13 @@
 //! Alignments under a stop signal, and of scans with far returns.
 
-use crate::util::Keyword;
 use std::cell::Cell;
 
-use super::*;
-use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
 use overlap::LOOKUPS_PER_LOOK;
+
+use super::*;
+use crate::geometry::{Point, Pose};
+use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use crate::util::{Keyword, StopSignal};
 
 /// `count` points on two walls and a floor.
 fn corner(count: usize) -> Vec<Point> {

@@ -1,8 +1,11 @@
 //! Verdicts: whether to believe an alignment, and why not.
 
+use super::free_space::Contradiction;
+use super::information::{Direction, PoseInformation};
+use super::prior::PosePrior;
 use super::refine::SurfaceFit;
+use super::settings::AlignmentSettings;
 use super::slide::Slide;
-use super::{AlignmentSettings, Contradiction, Direction, PoseInformation, PosePrior};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Probe;
+use super::probe::Probe;
 use crate::util::bits::for_each_bit;
 
 /// A counter that reached this value no longer counts: it stays until the filter is rebuilt.

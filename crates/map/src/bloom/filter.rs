@@ -2,7 +2,8 @@
 
 use super::counters::{COUNTER_MAX, Counters, CountersOfWord};
 use super::fill::fill;
-use super::{FilterSettings, Probe, expected_rate, ideal_false_positive_rate};
+use super::probe::Probe;
+use super::rates::{FilterSettings, expected_rate, ideal_false_positive_rate};
 
 /// A set of u64 keys that may answer "present" of an absent key, and never "absent" of a present one.
 ///
@@ -184,8 +185,8 @@ impl CountingBloomFilter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::HASHES_MAX;
     use super::*;
+    use crate::bloom::rates::HASHES_MAX;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 

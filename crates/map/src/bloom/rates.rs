@@ -1,6 +1,6 @@
 //! How many false positives to expect, and the settings that decide it.
 
-use super::BITS_OF_HASH;
+use super::probe::BITS_OF_HASH;
 
 /// Most hash functions a filter may have: each takes 6 bits of one of two hashes of 32.
 pub const HASHES_MAX: u32 = 2 * BITS_OF_HASH;

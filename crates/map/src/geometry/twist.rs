@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector3};
 
-use super::Pose;
+use super::pose::Pose;
 
 /// The velocity of a frame that moves, constant in the frame's own axes: a robot that drives along an arc has one.
 ///
@@ -53,8 +53,8 @@ const SMALL_ANGLE: f64 = 1e-5;
 
 #[cfg(test)]
 mod tests {
-    use super::super::pose_difference;
     use super::*;
+    use crate::geometry::pose::pose_difference;
     use proptest::prelude::*;
 
     proptest! {

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{
-    ContentHash, ContentVersion, IdempotencyLog, KEEP_OUTS_MAX, KeepOuts, MapSettings, MapSettingsError,
-    MultiResolutionMap, Trajectory,
-};
+use super::change::IdempotencyLog;
+use super::content_hash::{ContentHash, ContentVersion};
+use super::keep_out::{KEEP_OUTS_MAX, KeepOuts};
+use super::multi_resolution_map::MultiResolutionMap;
+use super::settings::{MapSettings, MapSettingsError};
+use super::trajectory::Trajectory;
 use crate::util::StopSignal;
 use crate::visibility::ViewpointSet;
 use crate::voxel::{MomentSet, VoxelSet};

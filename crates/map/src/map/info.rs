@@ -3,8 +3,10 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::shard::Shard;
-use super::{ContentVersion, MapView, MultiResolutionMap};
+use super::content_hash::ContentVersion;
+use super::multi_resolution_map::MultiResolutionMap;
+use super::shards::Shard;
+use super::view::MapView;
 use crate::bloom::CountingBloomFilter;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;

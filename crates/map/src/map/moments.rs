@@ -2,7 +2,7 @@
 
 use hashbrown::HashMap;
 
-use super::sharding::{SHARDS, Sharding};
+use super::shards::{SHARDS, Sharding};
 use crate::sync::{Rank, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
 use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};

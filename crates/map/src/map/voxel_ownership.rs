@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use hashbrown::HashMap;
 
-use super::{Change, MapContents, ScanRecord, WithdrawnChange};
+use super::change::Change;
+use super::contents::MapContents;
+use super::trajectory::{ScanRecord, WithdrawnChange};
 use crate::util::StopSignal;
 use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
@@ -252,7 +254,9 @@ mod tests {
 
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{DeletionRecord, MappedScan, RobotName};
+    use crate::map::change::DeletionRecord;
+    use crate::map::name::RobotName;
+    use crate::map::trajectory::MappedScan;
     use crate::voxel::Lattice;
 
     fn base(side: i32) -> MapContents {

@@ -1,6 +1,7 @@
 //! Filtering of a scan's points.
 
-use super::{MappingError, RayEnds};
+use super::error::MappingError;
+use super::ray_ends::RayEnds;
 use crate::geometry::Point;
 use crate::map::RobotName;
 use crate::scan::PointFilter;

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::time::SystemTime;
 
-use super::{LocatedScan, Scan};
+use super::located_scan::LocatedScan;
+use super::scan::Scan;
 use crate::align::Verdict;
 use crate::geometry::Pose;
 use crate::map::{MappedScan, RobotName};

@@ -1,6 +1,6 @@
 //! The rules of the locks, checked where `debug_assertions` are on.
 
-use super::Rank;
+use super::rank::Rank;
 
 /// A lock that the present thread holds; dropped with the guard.
 #[derive(Debug)]

@@ -8,8 +8,8 @@ use super::modeled as primitive;
 #[cfg(not(feature = "shuttle"))]
 use parking_lot as primitive;
 
-use super::Rank;
 use super::checks::{Held, hold, may_wait};
+use super::rank::Rank;
 
 /// A lock that one thread holds at a time.
 #[derive(Debug)]

@@ -18,9 +18,11 @@ mod checks;
 mod locks;
 #[cfg(feature = "shuttle")]
 mod modeled;
+mod rank;
 
-pub use checks::before_file_operation;
+pub use checks::{before_file_operation, polled_by_runtime};
 pub use locks::{Mutex, MutexGuard, RwLock, RwLockReadGuard, RwLockWriteGuard};
+pub use rank::Rank;
 #[cfg(feature = "shuttle")]
 pub use shuttle::sync::atomic::AtomicU64;
 #[cfg(feature = "shuttle")]
@@ -29,42 +31,3 @@ pub use shuttle::{sync::mpsc, thread};
 pub use std::sync::atomic::AtomicU64;
 #[cfg(not(feature = "shuttle"))]
 pub use std::{sync::mpsc, thread};
-
-pub use checks::polled_by_runtime;
-
-/// Where a lock stands in the order in which locks are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Rank {
-    /// The snapshots of a map's folder, held while one is written.
-    Snapshots,
-    /// A map's journal, held while it is written and synced.
-    Journal,
-    /// The turn to change a map.
-    Commit,
-    /// Held by who reads a map for long; a change waits for it where no short reader queues behind.
-    LongRead,
-    /// The moments of shard i. Several are taken in ascending order.
-    Moments(u8),
-    /// The voxels of shard i. Several are taken in ascending order.
-    Shard(u8),
-    /// The keep-outs of a map.
-    KeepOuts,
-    /// The viewpoints of a map.
-    Viewpoints,
-    /// The trajectory of a map.
-    Trajectory,
-    /// The answers to requests that a map remembers.
-    Requests,
-    /// The distance fields that a planner keeps beside a map.
-    Fields,
-    /// Anything that is held for a few instructions.
-    Brief,
-}
-
-#[cfg(debug_assertions)]
-impl Rank {
-    /// True of a lock of a map's content: nobody who holds it may wait for a disk.
-    fn forbids_file_operations(self) -> bool {
-        self >= Self::Commit
-    }
-}

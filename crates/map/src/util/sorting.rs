@@ -1,6 +1,6 @@
 //! Sorting that can be stopped.
 
-use super::StopSignal;
+use super::stop_signal::StopSignal;
 
 /// Items that are sorted between two looks at the stop signal: some ten milliseconds.
 const ITEMS_PER_SORT: usize = 256 << 10;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hashbrown::HashMap;
 
-use super::RangeImage;
+use super::range_image::RangeImage;
 use crate::geometry::Pose;
 
 /// How many cells a viewpoint reaches in each direction, at most.

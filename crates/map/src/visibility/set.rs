@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::range_image::WellBeyond;
 use super::reach::{ReachIndex, Slot};
-use super::{Viewpoint, WellBeyond};
+use super::viewpoint::Viewpoint;
 use crate::geometry::{Pose, pose_difference};
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.

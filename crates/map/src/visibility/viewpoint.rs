@@ -1,6 +1,6 @@
 //! A viewpoint: where a scan was taken, and how far it saw from there.
 
-use super::RangeImage;
+use super::range_image::RangeImage;
 use super::reach::Reach;
 use crate::geometry::Pose;
 

@@ -1,6 +1,7 @@
 //! Blocks of 8 x 8 x 8 voxels: three levels of the map in one 512-bit mask.
 
-use super::{Moments, VoxelKey};
+use super::key::VoxelKey;
+use super::moments::Moments;
 
 /// Levels that one block's mask holds.
 pub const BLOCK_LEVELS: u32 = 3;

@@ -1,7 +1,7 @@
 //! Voxels put together by block.
 
-use super::key::{AXIS_BITS, AXIS_MASK, AXIS_UNITS};
-use super::{BLOCK_LEVELS, BlockMask, Cell, VoxelKey};
+use super::block::{BLOCK_LEVELS, BlockMask, Cell};
+use super::key::{AXIS_BITS, AXIS_MASK, AXIS_UNITS, VoxelKey};
 
 /// Bits of a cell's number.
 const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
@@ -108,7 +108,7 @@ fn sort_by_digits(codes: &mut Vec<u64>, range: std::ops::Range<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::{INDEX_MAX, INDEX_MIN};
+    use crate::voxel::key::{INDEX_MAX, INDEX_MIN};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! Clusters of 4 x 4 x 4 blocks: which of them are there in one word, their masks packed behind it.
 
-use super::key::AXIS_BITS;
-use super::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey};
+use super::block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
+use super::key::{AXIS_BITS, VoxelKey};
 use crate::util::bits::for_each_bit;
 
 /// Levels from a block up to its cluster.

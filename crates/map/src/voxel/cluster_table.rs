@@ -1,8 +1,9 @@
 //! An exact set of voxels as an open-addressed table of clusters of blocks.
 
+use super::block::{BlockMask, Cell};
 use super::cluster::Cluster;
+use super::key::VoxelKey;
 use super::slots::{BUCKET, Bucket, Slots, Tags, VACANT, VACANT_BUCKET};
-use super::{BlockMask, Cell, VoxelKey};
 
 /// Slots for each cluster, at least. At 3 one bucket in 150 is full (a Poisson tail), so that nearly every search ends in
 /// the bucket where it began; a wide look-up leaves its way if one of eight does not. At 2 it was one in twenty, and small
@@ -230,7 +231,8 @@ fn vacant(buckets: usize) -> Vec<Cluster> {
 mod tests {
     use super::*;
     use crate::util::StopSignal;
-    use crate::voxel::{BlockInCluster, ClusterUpdate};
+    use crate::voxel::cluster::BlockInCluster;
+    use crate::voxel::cluster_update::ClusterUpdate;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 

@@ -2,8 +2,11 @@
 
 use hashbrown::HashMap;
 
+use super::block::BlockMask;
 use super::cluster::{BlockInCluster, Cluster};
-use super::{BLOCKS_PER_LOOK, BlockMask, ClusterTable, VoxelKey};
+use super::cluster_table::ClusterTable;
+use super::key::VoxelKey;
+use super::set::BLOCKS_PER_LOOK;
 use crate::util::StopSignal;
 
 /// Clusters as a change leaves them, made beside those that they are to replace: so readers go on meanwhile, and are

@@ -1,6 +1,6 @@
 //! The lattice: which voxel a point falls in (paper II), at every level (paper III).
 
-use super::{INDEX_MAX, INDEX_MIN, VoxelKey};
+use super::key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 use crate::geometry::{Point, Pose};
 
 /// Finest resolution a map may have, meters.

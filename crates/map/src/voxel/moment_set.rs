@@ -2,8 +2,10 @@
 
 use hashbrown::HashMap;
 
+use super::key::{INDEX_MAX, INDEX_MIN, VoxelKey};
+use super::lattice::LatticeFromPoints;
 use super::moments::{MOMENT_LEVEL, Moments};
-use super::{BLOCKS_PER_LOOK, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+use super::set::{BLOCKS_PER_LOOK, VoxelSet};
 use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
 
@@ -79,7 +81,8 @@ impl FromIterator<(VoxelKey, Moments)> for MomentSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::{Cell, Lattice};
+    use crate::voxel::block::Cell;
+    use crate::voxel::lattice::Lattice;
     use proptest::prelude::*;
 
     proptest! {

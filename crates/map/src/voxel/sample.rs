@@ -2,7 +2,7 @@
 
 use hashbrown::HashMap;
 
-use super::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
+use super::lattice::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
 use crate::geometry::Point;
 use crate::util::StopSignal;
 

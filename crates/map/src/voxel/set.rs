@@ -1,9 +1,11 @@
 //! A set of finest voxels as sorted blocks: what a scan touches, a deletion takes, a snapshot keeps.
 
+use super::block::{BLOCK_LEVELS, BlockMask, Cell};
 use super::block_sort::blocks_of;
-use super::{
-    BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
-};
+use super::key::{INDEX_MAX, INDEX_MIN, VoxelKey};
+use super::lattice::LatticeFromPoints;
+use super::moments::MOMENT_LEVEL;
+use super::quantize;
 use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
 
@@ -154,7 +156,7 @@ impl FromIterator<VoxelKey> for VoxelSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::Lattice;
+    use crate::voxel::lattice::Lattice;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 

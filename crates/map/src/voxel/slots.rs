@@ -1,7 +1,8 @@
 //! The slots of a table of clusters, as the look-ups read them: homes, tags and the search for a key.
 
+use super::block::BlockMask;
 use super::cluster::{BlockInCluster, CacheLine, Cluster};
-use super::{BlockMask, VoxelKey};
+use super::key::VoxelKey;
 
 /// Marks a vacant slot; no key sets bit 63.
 pub(super) const VACANT: u64 = u64::MAX;

@@ -1,6 +1,6 @@
 //! Results of global localization.
 
-use crate::align::{Alignment, Verdict};
+use crate::align::verdict::{Alignment, Verdict};
 use crate::geometry::Pose;
 use crate::map::ContentVersion;
 
@@ -100,4 +100,19 @@ pub enum LocalizationError {
         /// Limit on the bytes.
         bytes_max: usize,
     },
+}
+
+impl Localization {
+    /// The answer of a search that was stopped before its data structures were built.
+    pub(super) fn cut_short_at_once(version: ContentVersion) -> Self {
+        Self {
+            verdict: Verdict::Ambiguous,
+            reason: "the search was cut short before it began".into(),
+            candidates: Vec::new(),
+            exhaustive: false,
+            cut_short: true,
+            cells: 0,
+            version,
+        }
+    }
 }

@@ -161,7 +161,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::align::localize::LocalizationSettings;
+    use crate::align::localize::settings::LocalizationSettings;
     use crate::geometry::Point;
     use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
     use crate::util::StopSignal;

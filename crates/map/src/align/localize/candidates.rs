@@ -1,11 +1,14 @@
 //! Candidates: the places that a search found, refined by alignment and ranked.
 
+use super::answer::Candidate;
 use super::basins::Basin;
 use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
+use super::settings::LocalizationSettings;
 use super::visibility::blocked_share;
-use super::{Candidate, LocalizationSettings};
-use crate::align::{Alignment, AlignmentSettings, align_until, evaluate_at};
+use crate::align::sequential::{align_until, evaluate_at};
+use crate::align::settings::AlignmentSettings;
+use crate::align::verdict::Alignment;
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;

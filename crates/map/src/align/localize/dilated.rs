@@ -1,10 +1,12 @@
 //! Dilated levels that a search reads: those of one revision of the map, and coarser ones where they are needed.
 
+use super::answer::LocalizationError;
 use super::distance_field::DistanceField;
+use super::query::SearchBox;
 use super::sample::SearchSample;
+use super::settings::LocalizationSettings;
 use super::slabs::{BLOCKS_PER_LOOK, Slabs, VoxelBox};
-use super::supervision::{Unbuilt, check};
-use super::{LocalizationError, LocalizationSettings, SearchBox, Supervision};
+use super::supervision::{Supervision, Unbuilt, check};
 use crate::geometry::translation_m;
 use crate::map::{ContentVersion, MultiResolutionMap};
 use crate::util::StopSignal;

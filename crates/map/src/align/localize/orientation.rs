@@ -7,8 +7,9 @@ use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
 
 use super::dilated::DilatedLevels;
 use super::normals::{SURFACES_MAX, dominant_normals};
+use super::settings::LocalizationSettings;
 use super::supervision::{Unbuilt, check};
-use super::{Gravity, LocalizationSettings};
+use crate::align::gravity::Gravity;
 use crate::geometry::Point;
 use crate::util::StopSignal;
 use crate::voxel::{Cell, Lattice, VoxelKey, VoxelSet};

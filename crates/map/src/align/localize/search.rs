@@ -3,9 +3,11 @@
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
+use super::answer::SearchProgress;
 use super::basins::{Basin, Basins};
 use super::bound::{Bounds, PoseCell, Turned, eight};
-use super::{LocalizationSettings, SearchProgress, Supervision};
+use super::settings::LocalizationSettings;
+use super::supervision::Supervision;
 
 /// What a search found.
 #[derive(Debug)]

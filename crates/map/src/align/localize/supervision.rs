@@ -1,6 +1,6 @@
 //! Supervision of a search by its caller.
 
-use super::{LocalizationError, SearchProgress};
+use super::answer::{LocalizationError, SearchProgress};
 use crate::util::StopSignal;
 
 /// Callbacks of a search: when to end, where to report progress, and how much memory to take.

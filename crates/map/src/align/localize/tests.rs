@@ -3,8 +3,11 @@
 use std::cell::{Cell, RefCell};
 
 use super::*;
-use crate::geometry::Pose;
-use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
+use crate::align::{AlignmentSettings, Verdict};
+use crate::geometry::{Point, Pose};
+use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use crate::util::StopSignal;
+use crate::voxel::sample_bytes_max;
 
 /// Cells of a grid or points that are visited between two looks, at most.
 const WORK_PER_LOOK: u64 = 8 << 20;

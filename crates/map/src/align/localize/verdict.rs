@@ -1,7 +1,8 @@
 //! Verdict of global localization: whether the best candidate is where the scan was taken.
 
-use super::{Candidate, LocalizationSettings};
-use crate::align::Verdict;
+use super::answer::Candidate;
+use super::settings::LocalizationSettings;
+use crate::align::verdict::Verdict;
 
 /// Verdict on the first of `ranked`, with the reason. It is accepted where it fits, is determined in every direction,
 /// and no other place is as good.
@@ -59,7 +60,7 @@ fn rivals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::Alignment;
+    use crate::align::verdict::Alignment;
     use crate::geometry::Pose;
 
     fn candidate(overlap: f64, search_overlap: f64, blocked: f64) -> Candidate {

@@ -68,7 +68,7 @@ pub(super) fn blocked_share(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::localize::LocalizationSettings;
+    use crate::align::localize::settings::LocalizationSettings;
     use crate::geometry::Point;
     use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 

@@ -3,9 +3,9 @@
 
 use std::arch::x86_64::*;
 
-use super::AT_ONCE;
-use crate::bloom::Probe;
+use super::scalar::AT_ONCE;
 use crate::bloom::counters::{COUNTER_MAX, Counters};
+use crate::bloom::probe::Probe;
 use crate::util::cpu::Avx2;
 use crate::util::prefetch;
 

@@ -2,10 +2,10 @@
 
 use std::num::NonZeroU8;
 
+use super::cap::margin_of;
 use super::layer::Layer;
-use super::margin_of;
 use super::rows::Rows;
-use crate::map::CellBox;
+use crate::map::regions::CellBox;
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey, VoxelSet};
 

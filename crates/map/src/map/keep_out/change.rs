@@ -1,7 +1,7 @@
 //! What happens to keep-outs.
 
-use super::KeepOutShape;
-use crate::map::{CallerName, KeepOutName};
+use super::shape::KeepOutShape;
+use crate::map::name::{CallerName, KeepOutName};
 
 /// Something that happened to a keep-out.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,8 @@
 //! What of a shape lies within a band of height, seen from above.
 
-use super::{KeepOutShape, polygon};
-use crate::map::{OrientedBox, Region};
+use super::polygon;
+use super::shape::KeepOutShape;
+use crate::map::regions::{OrientedBox, Region};
 
 /// What is seen of a shape from above.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,9 @@
 //! The place of a shape that is nearest to a point.
 
-use super::{KeepOutShape, Prism, polygon};
-use crate::map::Region;
+use super::polygon;
+use super::prism::Prism;
+use super::shape::KeepOutShape;
+use crate::map::regions::Region;
 
 impl KeepOutShape {
     /// The place of the shape that is nearest to the point, which is the point where it lies inside; meters.

@@ -1,6 +1,6 @@
 //! Which points lie in keep-outs.
 
-use super::{KeepOut, KeepOuts};
+use super::keep_outs::{KeepOut, KeepOuts};
 use crate::geometry::{Point, Pose};
 use crate::util::StopSignal;
 
@@ -67,7 +67,10 @@ fn bounds_of(points_m: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::{KeepOutName, KeepOutShape, Prism, Region};
+    use crate::map::keep_out::prism::Prism;
+    use crate::map::keep_out::shape::KeepOutShape;
+    use crate::map::name::KeepOutName;
+    use crate::map::regions::Region;
     use proptest::prelude::*;
 
     fn keep_outs() -> KeepOuts {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::polygon;
-use crate::map::REGION_M_MAX;
+use crate::map::regions::REGION_M_MAX;
 
 /// Corners that the polygon of a prism may have.
 pub const PRISM_CORNERS_MAX: usize = 64;

@@ -1,7 +1,9 @@
 //! Where rays enter shapes.
 
-use super::{KeepOutShape, Prism, polygon};
-use crate::map::Region;
+use super::polygon;
+use super::prism::Prism;
+use super::shape::KeepOutShape;
+use crate::map::regions::Region;
 
 /// A ray from an origin, meters in the map frame, along a unit vector.
 #[derive(Debug, Clone, Copy)]

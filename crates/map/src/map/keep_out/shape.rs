@@ -1,7 +1,7 @@
 //! The space that a keep-out takes.
 
 use super::prism::{Prism, PrismError, is_near};
-use crate::map::{REGION_M_MAX, Region, RegionError};
+use crate::map::regions::{REGION_M_MAX, Region, RegionError};
 
 /// The space that a keep-out takes, in the map frame; borders belong to it. It is bounded.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 
-use super::{KeepOutShape, Prism};
+use super::prism::Prism;
+use super::shape::KeepOutShape;
 use crate::geometry::Pose;
-use crate::map::Region;
+use crate::map::regions::Region;
 
 /// A box, a ball, an oriented box or a prism.
 pub(crate) fn shape() -> impl Strategy<Value = KeepOutShape> {

@@ -1,7 +1,8 @@
 //! The voxels of a level that keep-outs take: a search that halves space and leaves out what no shape meets.
 
-use super::{KeepOutShape, KeepOuts};
-use crate::map::{Region, VoxelSelection};
+use super::keep_outs::KeepOuts;
+use super::shape::KeepOutShape;
+use crate::map::regions::{Region, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey, VoxelSet};
 
@@ -186,9 +187,9 @@ impl Target<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::KeepOutName;
-    use crate::map::keep_out::KeepOut;
+    use crate::map::keep_out::keep_outs::KeepOut;
     use crate::map::keep_out::test_shapes::shape;
+    use crate::map::name::KeepOutName;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 

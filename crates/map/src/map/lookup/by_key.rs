@@ -1,13 +1,15 @@
 //! The look-up in the filter alone, of voxels whose keys are known: what experiment 1 of the paper times by itself (IV-A).
 
-use super::{LevelView, scalar};
+use super::level_view::LevelView;
+use super::scalar;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2, avx512};
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::VoxelKey;
 
-/// [`super::occupied`] by the filter, which must be there, of voxels of the view's level whose keys are known.
+/// The look-up of points by the filter, which must be there, of voxels of the view's level whose keys are
+/// known.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
@@ -39,7 +41,11 @@ mod tests {
     use super::*;
     use crate::bloom::{FilterSettings, HASHES_MAX};
     use crate::geometry::Point;
-    use crate::map::{Lookup, MapContents, MapSettings, MultiResolutionMap, lookup};
+    use crate::map::contents::MapContents;
+    use crate::map::lookup;
+    use crate::map::lookup::level_view::Lookup;
+    use crate::map::multi_resolution_map::MultiResolutionMap;
+    use crate::map::settings::MapSettings;
     use crate::voxel::{VoxelSet, quantize};
 
     /// Points of a cube of 60 voxels, on borders too, and some that no voxel holds.

@@ -1,13 +1,13 @@
 //! The look-up as it is defined, point by point; the reference implementation, which runs where the CPU has no
 //! SIMD instructions.
 
-use super::{LevelView, Lookup};
+use super::level_view::{LevelView, Lookup};
 use crate::bloom::Probe;
 use crate::geometry::Point;
-use crate::map::sharding::shard_of_region;
+use crate::map::shards::shard_of_region;
 use crate::voxel::{Cell, LatticeFromPoints, VoxelKey};
 
-/// See [`super::occupied`].
+/// See [`super::by_point::occupied`].
 pub(super) fn occupied(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,

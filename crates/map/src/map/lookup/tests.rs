@@ -2,10 +2,13 @@
 
 use proptest::prelude::*;
 
-use super::{LevelView, Lookup, scalar};
+use super::level_view::{LevelView, Lookup};
+use super::scalar;
 use crate::bloom::{FilterSettings, HASHES_MAX};
 use crate::geometry::{Point, Pose};
-use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+use crate::map::contents::MapContents;
+use crate::map::multi_resolution_map::MultiResolutionMap;
+use crate::map::settings::MapSettings;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::{
@@ -16,7 +19,7 @@ type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64
 
 /// The SIMD variants that this machine can run.
 fn wide_kernels() -> Vec<(&'static str, Kernel)> {
-    let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::occupied)];
+    let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::by_point::occupied)];
     #[cfg(target_arch = "x86_64")]
     if Avx512::detect().is_some() {
         kernels.push(("avx512", |points, quantize, view, lookup, occupied| {
@@ -110,7 +113,7 @@ proptest! {
             let [mut expected, mut found] = [(); 2].map(|()| vec![7; points.len().div_ceil(64)]);
             let all = scalar::occupied(&points, &quantize, &level_view, Lookup::Exact, &mut expected);
             for lookup in [Lookup::Exact, Lookup::Bloom] {
-                let found_all = super::occupied(&points, &quantize, &level_view, lookup, &mut found);
+                let found_all = super::by_point::occupied(&points, &quantize, &level_view, lookup, &mut found);
                 prop_assert_eq!((found_all, &found), (all, &expected));
             }
         }
@@ -151,7 +154,7 @@ fn bits_past_the_last_point_are_zero() {
     let points = vec![Point::new(0.5, 0.5, 0.5); 67];
     let mut bits = [u64::MAX; 2];
     let view = map.view();
-    assert!(super::occupied(
+    assert!(super::by_point::occupied(
         &points,
         &map.lattice().from_map(),
         &view.level_view(0),

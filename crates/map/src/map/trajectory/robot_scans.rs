@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use super::chunked::Chunked;
 use super::id_ranges::IdRanges;
+use super::known_scan::ForgottenIds;
+use super::scan::MappedScan;
 use super::session::Session;
 use super::thinning::Seen;
-use super::{ForgottenIds, MappedScan};
-use crate::map::SessionName;
+use crate::map::name::SessionName;
 
 /// Sessions of one robot whose scan ids a map tells apart, at most, besides the empty one. Beyond, the session that was
 /// used least recently is closed: its name alone is remembered, and each of its ids counts as too old.
@@ -143,7 +144,8 @@ impl RobotScans {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        const OF_SESSION: usize = 2 * (size_of::<(SessionName, Session)>() + crate::map::NAME_LENGTH_MAX);
+        const OF_SESSION: usize =
+            2 * (size_of::<(SessionName, Session)>() + crate::map::name::NAME_LENGTH_MAX);
         let sessions: usize = self.sessions.values().map(|session| OF_SESSION + session.bytes()).sum();
         size_of::<Self>() + self.revisions.bytes() + sessions + self.closed.bytes() + self.seen.bytes()
     }

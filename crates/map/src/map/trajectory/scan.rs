@@ -1,7 +1,7 @@
 //! A scan as it enters a map, and what is kept of it.
 
 use crate::geometry::{Point, Pose};
-use crate::map::{RobotName, SessionName};
+use crate::map::name::{RobotName, SessionName};
 use crate::visibility::RangeImage;
 use crate::voxel::{Lattice, MomentSet, VoxelSet};
 

@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::geometry::Pose;
-use proptest::prelude::*;
+use crate::map::name::{RobotName, SessionName};
 
 #[derive(Debug, Clone)]
 enum Step {

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use hashbrown::HashSet;
 
-use super::MappedScan;
+use super::scan::MappedScan;
 use crate::geometry::Pose;
 
 /// How far poses of one robot lie apart that are kept for good.
@@ -82,7 +82,7 @@ fn cell_of(pose: &Pose, spacing: &TrajectorySpacing) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::RobotName;
+    use crate::map::name::RobotName;
 
     fn pose(x: f64, yaw_deg: f64, seconds: Option<i64>) -> MappedScan {
         let map_from_sensor =

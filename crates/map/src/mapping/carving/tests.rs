@@ -5,7 +5,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::map::{MapSettings, MappedScan, RobotName};
+use crate::geometry::{Point, Pose};
+use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use crate::mapping::MappingError;
+use crate::util::StopSignal;
+use crate::voxel::{VoxelKey, VoxelSet};
 
 const RESOLUTION_M: f64 = 0.1;
 /// Smallest and largest corner of the room.

@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::lost_robots::{LostRobots, SearchTask};
 use crate::align::Verdict;
 use crate::align::localize::{
     Gravity, Localization, LocalizationError, LocalizationQuery, MAP_DOWN, SearchBox, Supervision,
@@ -10,7 +9,10 @@ use crate::align::localize::{
 };
 use crate::geometry::{Pose, translation_m};
 use crate::map::RobotName;
-use crate::mapping::{LocatedScan, Scan, ScanMapper};
+use crate::mapping::located_scan::LocatedScan;
+use crate::mapping::lost_robots::{LostRobots, SearchTask};
+use crate::mapping::scan::Scan;
+use crate::mapping::scan_mapper::ScanMapper;
 use crate::util::StopSignal;
 
 /// Candidates that a search compares: a rival is enough to say no.

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{EXTENSIONS, FILE_BYTES_MAX};
+use super::supported::{EXTENSIONS, FILE_BYTES_MAX};
 
 /// Longest piece of a file that a message repeats, characters.
 const QUOTE_CHARS_MAX: usize = 80;

@@ -3,173 +3,20 @@
 //! A file is read whole before it is parsed, so that every count it declares can be checked against the bytes
 //! that are there, before anything is allocated for it.
 
+mod axis;
+mod count;
 mod error;
+mod files;
+mod format;
 mod pcd;
 mod ply;
-mod text;
-
-use std::fs::{self, File};
-use std::io::Read;
-use std::path::{Path, PathBuf};
-
-pub use error::ReadError;
-pub(super) use error::{Problem, quoted};
-pub(super) use text::{lines, number};
-
-use crate::geometry::Point;
-
-/// Most bytes a scan file may have: 89 million packed points.
-const FILE_BYTES_MAX: u64 = 1 << 30;
-/// Most points a header may declare.
-const POINTS_MAX: u64 = 100_000_000;
-/// Most bytes of a file in which its header must end.
-const HEADER_BYTES_MAX: usize = 1 << 20;
-/// The extensions that [`read_points`] knows.
-const EXTENSIONS: [&str; 4] = [".ply", ".pcd", ".xyz", ".f32"];
-
-/// The points of the scan file at `path`, in the sensor frame, meters.
-///
-/// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
-/// binary, binary_compressed), `.xyz` (text: the first three columns, divided by spaces or commas, `#` starts a
-/// comment), `.f32` (raw little-endian x y z). Points that are not finite are kept: they mean "no return".
-///
-/// # Errors
-/// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
-/// the error names the file and the line, byte or element.
-pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
-    let format = Format::named_by(path)?;
-    let bytes = read_file(path)?;
-    format.points(&bytes).map_err(|problem| problem.in_file(path))
-}
-
-/// The points in the `bytes` of a scan file; `path` gives the format by its extension, and errors name it.
-///
-/// # Errors
-/// When the bytes are of another format, broken or truncated.
-pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> {
-    Format::named_by(path)?.points(bytes).map_err(|problem| problem.in_file(path))
-}
-
-/// The scan files that `paths` name: a directory gives its scan files sorted by name, a file itself.
-///
-/// # Errors
-/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read, or
-/// a directory has no scan file.
-pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
-    let mut files = Vec::new();
-    for path in paths {
-        if fs::metadata(path).map_err(ReadError::io(path))?.is_dir() {
-            files.extend(files_of_directory(path)?);
-        } else {
-            Format::named_by(path)?;
-            files.push(path.clone());
-        }
-    }
-    Ok(files)
-}
-
-fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(directory).map_err(ReadError::io(directory))? {
-        let path = entry.map_err(ReadError::io(directory))?.path();
-        if Format::of(&path).is_some() && path.is_file() {
-            files.push(path);
-        }
-    }
-    if files.is_empty() {
-        return Err(ReadError::Empty { path: directory.to_owned() });
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// The content of the file at `path`, at most [`FILE_BYTES_MAX`] whatever its metadata says.
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let too_large = || ReadError::TooLarge { path: path.to_owned() };
-    let file = File::open(path).map_err(ReadError::io(path))?;
-    let length = file.metadata().map_err(ReadError::io(path))?.len();
-    if length > FILE_BYTES_MAX {
-        return Err(too_large());
-    }
-    let mut bytes = Vec::with_capacity(length as usize + 1);
-    file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(ReadError::io(path))?;
-    if bytes.len() as u64 > FILE_BYTES_MAX { Err(too_large()) } else { Ok(bytes) }
-}
-
-/// The extension of `path` without its dot, in lower case.
-fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Format {
-    Ply,
-    Pcd,
-    Xyz,
-    F32,
-}
-
-impl Format {
-    fn named_by(path: &Path) -> Result<Self, ReadError> {
-        let unknown = || ReadError::Extension { path: path.to_owned(), extension: extension(path) };
-        Self::of(path).ok_or_else(unknown)
-    }
-
-    fn of(path: &Path) -> Option<Self> {
-        match extension(path).as_str() {
-            "ply" => Some(Self::Ply),
-            "pcd" => Some(Self::Pcd),
-            "xyz" => Some(Self::Xyz),
-            "f32" => Some(Self::F32),
-            _ => None,
-        }
-    }
-
-    fn points(self, bytes: &[u8]) -> Result<Vec<Point>, Problem> {
-        match self {
-            Self::Ply => ply::points(bytes),
-            Self::Pcd => pcd::points(bytes),
-            Self::Xyz => text::points(bytes),
-            Self::F32 => packed_points(bytes),
-        }
-    }
-}
-
-fn packed_points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
-    let points = bytemuck::try_cast_slice(bytes).map_err(|_| {
-        let (size, whole) = (Point::BYTES, bytes.len() / Point::BYTES);
-        Problem::new(format!(
-            "{} bytes are not whole points of {size} bytes, point {whole} is cut short",
-            bytes.len()
-        ))
-    })?;
-    Ok(points.to_vec())
-}
-
-/// The axis, 0 to 2, of a property or field called `name`.
-fn axis(name: &str) -> Option<usize> {
-    match name {
-        "x" => Some(0),
-        "y" => Some(1),
-        "z" => Some(2),
-        _ => None,
-    }
-}
-
-/// Refuses `count` entries of at least `entry_bytes` each where only `have` bytes follow, or too many entries.
-fn check_count(what: &str, count: u64, entry_bytes: u64, have: usize) -> Result<(), Problem> {
-    if count > POINTS_MAX {
-        return Err(Problem::new(format!("the header declares {count} {what}, the limit is {POINTS_MAX}")));
-    }
-    let fits = count.checked_mul(entry_bytes).is_some_and(|need| need <= have as u64);
-    if !fits || (entry_bytes == 0 && count > 0) {
-        return Err(Problem::new(format!(
-            "the header declares {count} {what} of at least {entry_bytes} bytes each, but {have} bytes follow: \
-             the file is truncated or its header wrong"
-        )));
-    }
-    Ok(())
-}
-
+mod supported;
 #[cfg(test)]
 mod tests;
+mod text;
+
+pub(super) use error::Problem;
+pub use error::ReadError;
+pub(super) use files::read_file;
+pub use files::{parse_points, read_points, scan_files};
+pub(super) use text::{lines, number};

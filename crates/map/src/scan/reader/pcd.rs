@@ -7,7 +7,11 @@ use std::io::{BufRead, ErrorKind};
 
 use pcd_rs::{DataKind, Error, PcdDeserialize, PcdMeta, Reader, Schema, ValueKind};
 
-use super::{FILE_BYTES_MAX, HEADER_BYTES_MAX, Problem, axis, check_count, number};
+use super::axis::axis;
+use super::count::check_count;
+use super::error::Problem;
+use super::supported::{FILE_BYTES_MAX, HEADER_BYTES_MAX};
+use super::text::number;
 use crate::geometry::Point;
 
 /// Fewest bytes of one ascii value: a digit and a separator.

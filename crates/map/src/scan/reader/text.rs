@@ -1,6 +1,6 @@
 //! Points in lines of text.
 
-use super::{Problem, quoted};
+use super::error::{Problem, quoted};
 use crate::geometry::Point;
 
 /// The points of an `.xyz` file: x y z are the first three columns.

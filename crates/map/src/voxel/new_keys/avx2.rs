@@ -3,16 +3,16 @@
 
 use std::arch::x86_64::*;
 
-use super::super::BlockMask;
 use super::super::block::OFFSETS;
 use super::append::append;
 use crate::util::bits::for_each_bit;
 use crate::util::cpu::Avx2;
+use crate::voxel::block::BlockMask;
 
 /// Cells a step: one register of keys.
 const LANES: usize = 4;
 
-/// See [`super::keys_gained_scalar`].
+/// See [`super::scalar::keys_gained_scalar`].
 #[inline]
 pub(super) fn keys_gained(
     _: Avx2,

@@ -6,10 +6,10 @@
 
 use std::arch::x86_64::*;
 
-use super::NO_KEY;
+use super::scalar::NO_KEY;
 use crate::geometry::Point;
 use crate::util::cpu::Avx2;
-use crate::voxel::LatticeFromPoints;
+use crate::voxel::lattice::LatticeFromPoints;
 
 /// Points of one f32 register.
 pub const LANES: usize = 8;
@@ -61,8 +61,11 @@ pub struct Quantizer {
 }
 
 impl Quantizer {
-    #[target_feature(enable = "avx2")]
     /// The transform and the level, in every lane.
+    ///
+    /// # Safety
+    /// Needs AVX2.
+    #[target_feature(enable = "avx2")]
     pub fn load(t: &LatticeFromPoints, level: u32) -> Self {
         Self {
             rotation: t.rotation.map(|row| row.map(|r| _mm256_set1_ps(r))),
@@ -73,6 +76,9 @@ impl Quantizer {
 
     /// Indices of the level of up to eight points, axis by axis, and a bit for each that has a voxel: the SIMD variant of
     /// [`LatticeFromPoints::index`].
+    ///
+    /// # Safety
+    /// Needs AVX2.
     #[inline]
     #[target_feature(enable = "avx2")]
     pub fn index(&self, points: &[Point]) -> ([__m256i; 3], u8) {

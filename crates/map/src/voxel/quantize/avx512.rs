@@ -6,10 +6,11 @@
 
 use std::arch::x86_64::*;
 
-use super::NO_KEY;
+use super::scalar::NO_KEY;
 use crate::geometry::Point;
 use crate::util::cpu::Avx512;
-use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
+use crate::voxel::key::{INDEX_MAX, INDEX_MIN};
+use crate::voxel::lattice::LatticeFromPoints;
 
 /// Points of one f32 register.
 pub const LANES: usize = 16;
@@ -45,9 +46,12 @@ pub struct Quantizer {
 }
 
 impl Quantizer {
+    /// The transform and the level, in every lane.
+    ///
+    /// # Safety
+    /// Needs AVX-512 F.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    /// The transform and the level, in every lane.
     pub fn load(t: &LatticeFromPoints, level: u32) -> Self {
         Self {
             rotation: t.rotation.map(|row| row.map(|r| _mm512_set1_ps(r))),
@@ -58,6 +62,9 @@ impl Quantizer {
 
     /// Indices of the level of up to sixteen points, axis by axis, and a bit for each that has a voxel: the SIMD variant
     /// of [`LatticeFromPoints::index`].
+    ///
+    /// # Safety
+    /// Needs AVX-512 F.
     #[inline]
     #[target_feature(enable = "avx512f")]
     pub fn index(&self, points: &[Point]) -> ([__m512i; 3], u16) {

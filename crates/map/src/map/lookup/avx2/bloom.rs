@@ -2,10 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::{BATCH, Batch, LANES, LookupKernel, of_shards, prefetch, store};
+use super::kernel::{BATCH, Batch, LookupKernel};
+use super::registers::{of_shards, prefetch, store};
 use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
-use crate::map::lookup::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::SHARDS;
+use crate::voxel::quantize::avx2::LANES;
 
 /// The bit planes: address and words of each shard's.
 pub(super) struct Planes {

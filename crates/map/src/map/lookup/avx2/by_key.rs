@@ -1,9 +1,9 @@
 //! The look-up of known keys in the filter, a batch at a time.
 
 use super::bloom::Planes;
-use super::{BATCH, Batch, LookupKernel};
-use crate::map::lookup::LevelView;
-use crate::map::sharding::shard_of_region;
+use super::kernel::{BATCH, Batch, LookupKernel};
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::shard_of_region;
 use crate::util::cpu::Avx2;
 use crate::voxel::VoxelKey;
 use crate::voxel::quantize::NO_KEY;

@@ -2,9 +2,11 @@
 
 use std::arch::x86_64::*;
 
-use super::{BATCH, Batch, LANES, LookupKernel, mix, of_shards, pack, prefetch, scale, store};
-use crate::map::lookup::LevelView;
-use crate::map::sharding::SHARDS;
+use super::kernel::{BATCH, Batch, LookupKernel};
+use super::registers::{mix, of_shards, pack, prefetch, scale, store};
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::SHARDS;
+use crate::voxel::quantize::avx2::LANES;
 use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, CLUSTER_LEVELS, Cell, Cluster, Slots};
 
 /// The tables: addresses of keys, and buckets, of each shard's.

@@ -2,12 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::{Batch, LANES};
+use super::kernel::Batch;
 use crate::geometry::Point;
-use crate::map::lookup::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::SHARDS;
 use crate::voxel::LatticeFromPoints;
-use crate::voxel::quantize::avx2::Quantizer;
+use crate::voxel::quantize::avx2::{LANES, Quantizer};
 
 /// Finds the voxels of points, and the shards that these are in.
 pub(super) struct Locator {

@@ -2,11 +2,11 @@
 
 use std::arch::x86_64::*;
 
+use super::kernel::{GROUPS, LookupKernel};
 use super::registers::{Addresses, PerShard, addresses, eight_of, gather, lengths, odd, prefetch, sum_of};
-use super::{GROUPS, LANES, LookupKernel};
 use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
-use crate::map::lookup::LevelView;
-use crate::voxel::quantize::avx512::{halves, lanes};
+use crate::map::lookup::level_view::LevelView;
+use crate::voxel::quantize::avx512::{LANES, halves, lanes};
 
 /// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says. With `FETCH`, words are fetched as soon
 /// as they are located.

@@ -3,12 +3,12 @@
 use std::arch::x86_64::*;
 
 use super::bloom::{BloomRegisters, Located};
-use super::{GROUPS, LANES, WORD};
-use crate::map::lookup::LevelView;
-use crate::map::sharding::SHARDS;
+use super::kernel::{GROUPS, WORD};
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::SHARDS;
 use crate::util::cpu::Avx512;
 use crate::voxel::quantize::NO_KEY;
-use crate::voxel::quantize::avx512::lanes;
+use crate::voxel::quantize::avx512::{LANES, lanes};
 
 /// See `lookup::filter_contains`.
 pub(in crate::map::lookup) fn filter_contains(

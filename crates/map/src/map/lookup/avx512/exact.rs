@@ -1,15 +1,13 @@
 //! The probe of the table of blocks.
 
-mod tables;
-
 use std::arch::x86_64::*;
 
+use super::kernel::{GROUPS, LookupKernel, WORD};
 use super::registers::{eight_of, gather_now, load, prefetch_now, store, widen};
-use super::{GROUPS, LANES, LookupKernel, WORD};
-use crate::map::lookup::LevelView;
-use crate::voxel::quantize::avx512::{lanes, pack};
+use super::tables::{CELL_BITS, Found, Tables, within_shard};
+use crate::map::lookup::level_view::LevelView;
+use crate::voxel::quantize::avx512::{LANES, lanes, pack};
 use crate::voxel::{BLOCK_LEVELS, CLUSTER_LEVELS, Cell};
-use tables::{CELL_BITS, Found, Tables, within_shard};
 
 /// The table of blocks.
 ///

@@ -3,8 +3,8 @@
 use std::arch::x86_64::*;
 
 use crate::geometry::Point;
-use crate::map::lookup::LevelView;
-use crate::map::sharding::SHARDS;
+use crate::map::lookup::level_view::LevelView;
+use crate::map::shards::SHARDS;
 use crate::voxel::LatticeFromPoints;
 use crate::voxel::quantize::avx512::Quantizer;
 

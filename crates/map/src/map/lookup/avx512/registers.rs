@@ -2,9 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::LANES;
-use crate::map::sharding::SHARDS;
+use crate::map::shards::SHARDS;
 use crate::util;
+use crate::voxel::quantize::avx512::LANES;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 

@@ -4,9 +4,11 @@
 
 use ply_rs_bw::ply::{ElementDef, Header, PropertyDef, PropertyType};
 
-use super::{before_vertex, check_element};
+use super::vertex::{before_vertex, check_element};
 use crate::geometry::Point;
-use crate::scan::reader::{Problem, axis, lines, number};
+use crate::scan::reader::axis::axis;
+use crate::scan::reader::error::Problem;
+use crate::scan::reader::text::{lines, number};
 
 /// How the tokens of an ascii property are read.
 enum Column {

@@ -3,9 +3,10 @@
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult};
 
-use super::{before_vertex, check_element};
+use super::vertex::{before_vertex, check_element};
 use crate::geometry::Point;
-use crate::scan::reader::{Problem, axis, quoted};
+use crate::scan::reader::axis::axis;
+use crate::scan::reader::error::{Problem, quoted};
 
 /// The points of a binary payload of either byte order.
 pub(super) fn points(

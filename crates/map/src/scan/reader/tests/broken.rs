@@ -1,9 +1,13 @@
 //! Truncated, corrupt and hostile files.
 
+use std::path::Path;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::*;
+use super::files::*;
+use crate::scan::reader::format::Format;
+use crate::scan::reader::supported::EXTENSIONS;
 
 #[test]
 fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {

@@ -1,6 +1,6 @@
 //! What the errors say.
 
-use super::*;
+use super::files::*;
 
 #[test]
 fn an_error_names_line_or_element_and_what_is_needed() {

@@ -1,0 +1,247 @@
+//! The mapper: where a scan was taken, and what of it enters the map.
+
+use std::borrow::Cow;
+use std::time::Instant;
+
+use super::carving::{Carving, CarvingScan, CarvingSettings};
+use super::deskew::DeskewSettings;
+use super::error::MappingError;
+use super::located_scan::LocatedScan;
+use super::recovery_settings::Recovery;
+use super::resolved_guess::last_seen;
+use super::scan::Scan;
+use super::sightings::Sightings;
+use super::stationary::StationarySettings;
+use super::viewpoints::{SeenScan, ViewpointSettings};
+use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
+use crate::geometry::{Point, Pose, Twist};
+use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
+use crate::util::StopSignal;
+
+/// Maps scans: finds where each was taken, and adds those that fit to the map.
+///
+/// ```
+/// use mrol::geometry::{Point, Pose};
+/// use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
+/// use mrol::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
+/// use mrol::util::StopSignal;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let map = MultiResolutionMap::new(MapSettings::new(0.05, 4))?;
+/// let robot = RobotName::new("r1")?;
+/// let points: Vec<_> = (0..200).map(|i| Point::new(2.0, 0.02 * i as f32, 0.5)).collect();
+///
+/// let sightings = Sightings::default();
+/// let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+/// let mapped = mapper.map_scan(&Scan::new(&robot, &points), StopSignal::NEVER)?;
+/// assert!(mapped.is_inserted());
+/// assert_eq!(mapped.located.alignment.map_from_sensor, Pose::identity());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct ScanMapper<'a> {
+    pub(super) map: &'a MultiResolutionMap,
+    pub(super) sightings: &'a Sightings,
+    pub(super) settings: MappingSettings,
+    pub(super) recovery: Option<Recovery<'a>>,
+}
+
+/// Settings of a [`ScanMapper`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MappingSettings {
+    /// How scans are aligned.
+    pub alignment: AlignmentSettings,
+    /// When a scan shows nothing new because its robot stands still; none: every scan that fits is inserted.
+    pub stationary: Option<StationarySettings>,
+    /// When a motion is believed that scans are deskewed with.
+    pub deskew: DeskewSettings,
+    /// When a scan leaves a viewpoint.
+    pub viewpoints: ViewpointSettings,
+    /// What a scan that fits carves out of the map; none: it only adds.
+    pub carving: Option<CarvingSettings>,
+}
+
+impl<'a> ScanMapper<'a> {
+    /// A mapper of scans into `map`, whose robots were seen as `sightings` tells.
+    pub fn new(map: &'a MultiResolutionMap, sightings: &'a Sightings, settings: MappingSettings) -> Self {
+        Self { map, sightings, settings, recovery: None }
+    }
+
+    /// This mapper, which looks from one start alone, for no lost robot, and for some 30 ms: the answer holds where it is
+    /// accepted and [wants no more starts](Alignment::wants_more_starts).
+    #[must_use]
+    pub fn from_one_start(self) -> Self {
+        let mut settings = self.settings;
+        settings.alignment.multi_start.ascents = 0;
+        Self { settings, recovery: None, ..self }
+    }
+
+    /// This mapper, whose scans carve the map as `carving` says, or not.
+    #[must_use]
+    pub fn carving(self, carving: Option<CarvingSettings>) -> Self {
+        Self { settings: MappingSettings { carving, ..self.settings }, ..self }
+    }
+
+    /// Finds where a scan was taken; changes nothing.
+    ///
+    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other
+    /// one is aligned from its guess, or only judged there where the caller wants it at its guess. Points with times are
+    /// deskewed: first by the motion that the guess tells, then, once the alignment has found the pose, by the motion to
+    /// that, and aligned again.
+    ///
+    /// # Errors
+    /// The guess needs a pose that is not there, or `stop` said so.
+    pub fn locate(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<LocatedScan, MappingError> {
+        let Self { map, sightings, .. } = self;
+        let start = Instant::now();
+        let map_is_empty = map.is_empty();
+        let guess =
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
+        let mut velocity = self.velocity(scan, &guess);
+        let mut alignment = if map_is_empty {
+            let upright = if scan.at_guess { guess } else { scan.prior(guess).leveled_guess() };
+            Alignment::trusted(upright, map.settings().levels, scan.points)
+        } else {
+            self.align(scan, velocity.as_ref(), &guess, stop)
+        };
+        if scan.times_s.is_some() && !scan.at_guess && alignment.verdict == Verdict::Accepted {
+            let found = self.velocity(scan, &alignment.map_from_sensor);
+            if found.is_some() && found != velocity {
+                let wants_more_starts = alignment.wants_more_starts;
+                alignment = self.align(scan, found.as_ref(), &alignment.map_from_sensor, stop);
+                alignment.wants_more_starts |= wants_more_starts;
+                velocity = found;
+            }
+        }
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        let is_first = map_is_empty && !scan.at_guess;
+        let align_time = start.elapsed();
+        Ok(LocatedScan { guess, alignment, align_time, is_first, velocity, recovered: None })
+    }
+
+    /// Aligns a scan from `guess`, or judges it there, its points deskewed by `velocity`.
+    fn align(
+        &self,
+        scan: &Scan<'_>,
+        velocity: Option<&Twist>,
+        guess: &Pose,
+        stop: StopSignal<'_>,
+    ) -> Alignment {
+        let (points, settings) = (scan.points_at(velocity), &self.settings.alignment);
+        match scan.at_guess {
+            true => evaluate_at_until(self.map, &points, guess, settings, stop).accepted_by_caller(),
+            false => align_until(self.map, &points, &scan.prior(*guess), settings, stop),
+        }
+    }
+
+    /// The velocity of the sensor of a scan with times, if it was taken at `map_from_sensor`: constant since its robot
+    /// was seen last. None where a time or the last pose is not known.
+    fn velocity(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> Option<Twist> {
+        scan.times_s?;
+        let (last, last_ns) = last_seen(scan.robot, &self.map.trajectory(), self.sightings)?;
+        self.settings.deskew.velocity((&last, last_ns), (map_from_sensor, scan.timestamp_ns))
+    }
+
+    /// The record of a scan where it was found: every voxel it touches, the moments of its points where the map keeps them,
+    /// its pose, and its viewpoint where it sees something new.
+    ///
+    /// # Errors
+    /// No point lies within the map's range, or `stop` said so.
+    pub fn record(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> Result<ScanRecord, MappingError> {
+        let (alignment, velocity) = (&located.alignment, located.velocity.as_ref());
+        let pose = MappedScan {
+            robot: scan.robot.clone(),
+            session: scan.session.clone(),
+            scan_id: scan.scan_id,
+            timestamp_ns: scan.timestamp_ns,
+            map_from_sensor: alignment.map_from_sensor,
+            revision: 0,
+            level_overlaps: alignment.level_overlaps.clone(),
+            iterations: alignment.iterations,
+            points_skipped: scan.points_skipped,
+            new_voxels: 0,
+            carved_voxels: 0,
+            digest: scan.digest,
+        };
+        let points = scan.points_at(velocity);
+        let mut record = match self.map.settings().moments {
+            true => ScanRecord::of_points(pose, &points, self.map.lattice()),
+            false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
+        };
+        if record.voxels.is_empty() {
+            let (min_m, end_m) = self.map.lattice().range_m();
+            return Err(MappingError::OutOfRange { min_m, end_m });
+        }
+        let mut ends = self.met(scan, &record, velocity);
+        if !scan.no_returns.points.is_empty() {
+            ends.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
+        }
+        let (map_from_sensor, moved_m) = (&alignment.map_from_sensor, scan.moved_m(velocity));
+        let seen = SeenScan { points: &ends, map_from_sensor, moved_m };
+        record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        Ok(record)
+    }
+
+    /// Where rays of a scan ended, the robot itself too, where the scan is as its record says.
+    ///
+    /// Points outside the map's range are none: drivers write a huge number where nothing returned, which says nothing.
+    fn met<'s>(&self, scan: &Scan<'s>, record: &ScanRecord, velocity: Option<&Twist>) -> Cow<'s, [Point]> {
+        let mut met = scan.met_at(velocity);
+        if record.pose.points_skipped > scan.points_skipped {
+            let from_points = self.map.lattice().from_points(&record.pose.map_from_sensor);
+            met.to_mut().retain(|&point| from_points.index(point).is_some());
+        }
+        met
+    }
+
+    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, or the
+    /// scan does not fit.
+    ///
+    /// They are those of the map's revision that the answer names: whoever inserts the scan later
+    /// [cuts](Carving::cut) them to what is still there.
+    ///
+    /// # Errors
+    /// When `stop` said so.
+    pub fn carve(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        record: &ScanRecord,
+        stop: StopSignal<'_>,
+    ) -> Result<Carving, MappingError> {
+        let Some(settings) = self.settings.carving.filter(|_| located.is_accepted()) else {
+            return Ok(Carving::default());
+        };
+        let points = self.met(scan, record, located.velocity.as_ref());
+        let moved_m = scan.moved_m(located.velocity.as_ref());
+        CarvingScan { points: &points, record, moved_m }.carve(self.map, &settings, stop)
+    }
+
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken, and carves nothing. That
+    /// the robot was seen there is noted for its next guess.
+    ///
+    /// Never true of a scan that the caller wants at its guess, or in the map whatever it shows (`force`).
+    pub fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
+        let is_kept = scan.at_guess || scan.force || !record.carved.is_empty();
+        let Some(settings) = self.settings.stationary.filter(|_| !is_kept) else {
+            return false;
+        };
+        let Some(last) = self.map.trajectory().last_of(scan.robot).cloned() else { return false };
+        let is_stationary = settings.is_stationary(self.map, &last, record);
+        if is_stationary {
+            self.sightings.note_standing(&last, record.pose.map_from_sensor, scan.timestamp_ns);
+        }
+        is_stationary
+    }
+}

@@ -1,0 +1,79 @@
+//! Scan files and folders of them.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::error::ReadError;
+use super::format::Format;
+use super::supported::FILE_BYTES_MAX;
+use crate::geometry::Point;
+
+/// The points of the scan file at `path`, in the sensor frame, meters.
+///
+/// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
+/// binary, binary_compressed), `.xyz` (text: the first three columns, divided by spaces or commas, `#` starts a
+/// comment), `.f32` (raw little-endian x y z). Points that are not finite are kept: they mean "no return".
+///
+/// # Errors
+/// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
+/// the error names the file and the line, byte or element.
+pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
+    let format = Format::named_by(path)?;
+    let bytes = read_file(path)?;
+    format.points(&bytes).map_err(|problem| problem.in_file(path))
+}
+
+/// The points in the `bytes` of a scan file; `path` gives the format by its extension, and errors name it.
+///
+/// # Errors
+/// When the bytes are of another format, broken or truncated.
+pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> {
+    Format::named_by(path)?.points(bytes).map_err(|problem| problem.in_file(path))
+}
+
+/// The scan files that `paths` name: a directory gives its scan files sorted by name, a file itself.
+///
+/// # Errors
+/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read, or
+/// a directory has no scan file.
+pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if fs::metadata(path).map_err(ReadError::io(path))?.is_dir() {
+            files.extend(files_of_directory(path)?);
+        } else {
+            Format::named_by(path)?;
+            files.push(path.clone());
+        }
+    }
+    Ok(files)
+}
+
+fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(directory).map_err(ReadError::io(directory))? {
+        let path = entry.map_err(ReadError::io(directory))?.path();
+        if Format::of(&path).is_some() && path.is_file() {
+            files.push(path);
+        }
+    }
+    if files.is_empty() {
+        return Err(ReadError::Empty { path: directory.to_owned() });
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The content of the file at `path`, at most [`FILE_BYTES_MAX`] whatever its metadata says.
+pub(in crate::scan) fn read_file(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let too_large = || ReadError::TooLarge { path: path.to_owned() };
+    let file = File::open(path).map_err(ReadError::io(path))?;
+    let length = file.metadata().map_err(ReadError::io(path))?.len();
+    if length > FILE_BYTES_MAX {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::with_capacity(length as usize + 1);
+    file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(ReadError::io(path))?;
+    if bytes.len() as u64 > FILE_BYTES_MAX { Err(too_large()) } else { Ok(bytes) }
+}
