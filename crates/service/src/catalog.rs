@@ -1,10 +1,7 @@
 //! The maps by name, in memory and on disk.
 
 mod opening;
-#[cfg(test)]
-mod turns;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,15 +9,16 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use super::allowed_maps::Reachable;
+use super::built_map::BuiltMap;
 use super::commit_queue::CommitThread;
 use super::hosted_map::HostedMap;
-use super::map_file::BuiltMap;
+use super::named::Named;
 use super::{AllowedMaps, ErrorCode, MapVersion, Reason, ServiceError, UnavailableMap};
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
 use mrol_map::sync::{Rank, RwLock};
 use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
-use opening::open_all;
+use opening::{not_stored, open_all};
 
 /// How long who makes, replaces or deletes a map waits for the one before: as long as a disk may reasonably take.
 const TURN_MAX: Duration = Duration::from_secs(10);
@@ -32,14 +30,6 @@ pub(super) struct Catalog {
     data_dir: Option<Arc<DataDir>>,
     settings: StoreSettings,
     writing: tokio::sync::Mutex<()>,
-}
-
-/// What the names stand for.
-#[derive(Debug, Default)]
-struct Named {
-    open: BTreeMap<MapName, Arc<HostedMap>>,
-    /// Why it could not be opened.
-    unavailable: BTreeMap<MapName, String>,
 }
 
 impl Catalog {
@@ -357,13 +347,15 @@ fn description(settings: &MapSettings) -> String {
     format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}")
 }
 
-fn not_stored(error: StoreError) -> ServiceError {
-    ServiceError::new(Reason::NotStored, error.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Marks;
+    use crate::resource_budget::ResourceBudget;
+    use mrol_map::map::MapContents;
+    use mrol_map::voxel::VoxelSet;
+
+    const MAPS_MAX: usize = 8;
 
     #[test]
     fn the_name_of_a_replaced_map_fits_and_is_free() {
@@ -377,5 +369,38 @@ mod tests {
         let cut = name_of_replaced(&long, 1 << 53, &[]).unwrap();
         assert_eq!(cut.as_str().len(), NAME_LENGTH_MAX);
         assert!(cut.as_str().ends_with("a-replaced-9007199254740992"), "{cut:?}");
+    }
+    fn named(name: &str) -> Reachable {
+        AllowedMaps::Every.check(&MapName::new(name).unwrap()).unwrap()
+    }
+
+    fn built(settings: MapSettings) -> BuiltMap {
+        let contents = MapContents::at(0, VoxelSet::default());
+        let map = MultiResolutionMap::restore(settings, contents).unwrap();
+        let saving = ResourceBudget::new(None, Marks::default()).reserve(0).unwrap();
+        BuiltMap { uuid: Uuid::nil(), map, saving }
+    }
+
+    /// What is told within ten times as long as anybody is to wait for its turn to make, replace or delete a map.
+    async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> Reason {
+        let ended = tokio::time::timeout(10 * TURN_MAX, waiting).await.expect("it does not wait for ever");
+        ended.map(drop).map_err(|error| error.reason).expect_err("it has no turn")
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
+        let progress = OpeningProgress::default();
+        let catalog = Catalog::open(None, &StoreSettings::default(), &progress).unwrap();
+        let settings = MapSettings::new(0.1, 4);
+        catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
+        let turn = catalog.writing.lock().await;
+        let busy = Reason::CatalogBusy;
+        assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX)).await, busy);
+        assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
+        assert_eq!(told(catalog.delete(&named("there"))).await, busy);
+        // What is there already waits for nobody.
+        assert!(!catalog.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
+        drop(turn);
+        assert!(catalog.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
     }
 }

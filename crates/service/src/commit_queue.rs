@@ -18,100 +18,19 @@ mod worker;
 
 use std::sync::{Arc, OnceLock};
 
-use tokio::sync::{OwnedMutexGuard, oneshot, watch};
+use tokio::sync::{oneshot, watch};
 
-use super::recent_changes::RecentChanges;
-use super::resource_budget::Reservation;
+use super::stop::Stop;
+use super::submission::{Outcome, Submission, Waiting};
 use super::{Reason, ServiceError};
-use mrol_map::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
+use mrol_map::map::{MapName, MultiResolutionMap};
 use mrol_map::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use mrol_map::sync::thread;
-use mrol_map::util::{Durations, SharedDurations, StopSignal};
-use mrol_store::{MapFolder, Pin, Record, StoreError, StoreSettings};
+use mrol_map::util::{Durations, SharedDurations};
+use mrol_store::{MapFolder, StoreSettings};
 pub(super) use scan_turn::TurnLimits;
-use worker::Worker;
-
-/// Changes that share one sync, and as many that wait meanwhile; one more is refused.
-const GROUP_MAX: usize = 256;
-
-/// Keeps one robot's scans in order; held until its change is visible.
-pub(super) type Turn = Arc<OwnedMutexGuard<()>>;
-/// Decides on a change when everything before it is applied; none where there is nothing to change. While it does, all
-/// other changes of the map wait: it gives up where nobody waits for the answer any more.
-pub(super) type Decision =
-    Box<dyn FnOnce(&MultiResolutionMap, StopSignal<'_>) -> Result<Option<Decided>, Refusal> + Send + 'static>;
-
-/// A change that was decided on in its turn.
-pub(super) struct Decided {
-    pub(super) change: Change,
-    /// Where it was made before.
-    pub(super) record: Option<Record>,
-    /// The memory that it takes.
-    pub(super) lent: Vec<Reservation>,
-    /// Keeps what it was made of until it is visible.
-    pub(super) pin: Option<Pin>,
-}
-
-/// A change on its way into the map.
-pub(super) enum Submission {
-    /// Known.
-    Prepared(Box<Prepared>),
-    /// To be decided on.
-    Undecided(Decision),
-}
-
-/// A change that is known before its turn comes.
-pub(super) struct Prepared {
-    pub(super) change: Change,
-    /// Where there is a journal.
-    pub(super) record: Option<Record>,
-    /// True of a change that was decided on an empty map, and holds for no other.
-    pub(super) if_empty: bool,
-    /// What a scan may still do when its turn comes.
-    pub(super) limits: TurnLimits,
-    pub(super) turn: Turn,
-    /// The memory that it takes.
-    pub(super) reservation: Reservation,
-}
-
-/// Why a change was not made.
-#[derive(Debug)]
-pub(super) enum Refusal {
-    /// The map has changed since it was decided on: decide again.
-    Stale,
-    /// The change cannot be made.
-    Failed(ServiceError),
-}
-
-impl From<ServiceError> for Refusal {
-    fn from(error: ServiceError) -> Self {
-        Self::Failed(error)
-    }
-}
-
-pub(super) type Outcome = Result<Committed, Refusal>;
-
-/// A request that is answered, or on its way into the map.
-pub(super) enum Step<A> {
-    /// The request changes nothing, or was done before: its answer.
-    Answered(A),
-    /// What becomes of it will be known, and then what to say.
-    Submitted(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
-}
-
-/// Who is told of a change when it is visible.
-pub(super) struct Told {
-    /// Those who wait for a revision.
-    pub(super) announced: watch::Sender<u64>,
-    /// Those who watch the map.
-    pub(super) recent: Arc<RecentChanges>,
-}
-
-/// A submission with the one who waits for it.
-struct Waiting {
-    submission: Submission,
-    answer: oneshot::Sender<Outcome>,
-}
+pub(super) use worker::Published;
+use worker::{GROUP_MAX, Worker};
 
 /// The way into a map. Dropping it ends the map's thread, after the changes that wait.
 #[derive(Debug)]
@@ -121,13 +40,6 @@ pub(super) struct CommitQueue {
     /// True once no other revision will come: those who wait for one hold the map, and so its thread.
     ended: watch::Sender<bool>,
     durations: Arc<SharedDurations>,
-}
-
-/// Closures have no form to print.
-impl std::fmt::Debug for Waiting {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Waiting")
-    }
 }
 
 /// The thread of a map that is not there yet. It is started before anything is done on the disk, so that what was done
@@ -159,14 +71,14 @@ impl CommitQueue {
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
-        told: Told,
+        published: Published,
         settings: &StoreSettings,
     ) -> Self {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
         let durations = Arc::<SharedDurations>::default();
         let worker =
-            Worker::new(name, map, folder, told, Arc::clone(&stopped), Arc::clone(&durations), settings);
+            Worker::new(name, map, folder, published, Arc::clone(&stopped), Arc::clone(&durations), settings);
         // It waits for just this.
         drop(thread.0.send((worker, waiting)));
         Self { inbox, stopped, ended: watch::Sender::new(false), durations }
@@ -222,57 +134,4 @@ impl CommitQueue {
         }
         self.ended.send_replace(true);
     }
-}
-
-/// Why a map takes no more changes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// The map's journal could not be written: what the disk holds is unknown.
-    Failed(String),
-    /// The map was deleted.
-    Deleted,
-    /// Another has its name now.
-    Replaced,
-}
-
-impl Stop {
-    /// What to say to who wants to change the map.
-    pub(super) fn refusal(&self, name: &MapName) -> ServiceError {
-        match self {
-            Self::Failed(reason) => {
-                let message = format!(
-                    "map {name} is read only since its journal failed ({reason}): restart the server when the disk \
-                     is well"
-                );
-                ServiceError::new(Reason::MapReadOnly, message)
-            }
-            Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
-            Self::Replaced => {
-                let message = format!("map {name} was replaced by another: ask for its map_uuid");
-                ServiceError::new(Reason::MapReplaced, message)
-            }
-        }
-    }
-}
-
-/// What to say to whose change was handed to a journal that failed then.
-fn outcome_unknown(name: &MapName, error: &StoreError) -> ServiceError {
-    let message = format!(
-        "the journal of map {name} failed while this change was written ({error}): it may be there after the next \
-         restart of the server; the same scan_id or request_id, sent again then, tells"
-    );
-    ServiceError::new(Reason::OutcomeUnknown, message)
-}
-
-/// What to say where the map has no revision left.
-fn revisions_used_up(name: &MapName) -> ServiceError {
-    let message = format!(
-        "map {name} is at revision {REVISION_MAX}, the last that there is: make another map, and insert there"
-    );
-    ServiceError::new(Reason::RevisionsUsedUp, message)
-}
-
-/// The record of a change.
-pub(super) fn record_of(change: &Change) -> Result<Record, ServiceError> {
-    Record::of(change).map_err(|reason| ServiceError::new(Reason::RecordTooLarge, reason))
 }

@@ -2,20 +2,64 @@
 
 use std::sync::Arc;
 
-use super::commit_queue::{Decided, Refusal, Step, Submission};
 use super::digest::{Digest, FormerDigest};
+use super::growth::{BLOCK_BYTES, removal_bytes};
 use super::hosted_map::HostedMap;
+use super::observer;
+use super::request::{key_in_range, point_without_voxel};
 use super::resource_budget::ResourceBudget;
+use super::submission::{Decided, Step, Submission};
+use super::time_limit::TimeLimit;
 use super::{
-    Deletion, DeletionAnswer, DeletionTarget, NotSeenSince, Reason, ServiceError, check_not_stopped,
+    Deletion, DeletionAnswer, DeletionTarget, MapService, NotSeenSince, Outcome, ServiceError,
+    check_not_stopped,
 };
 use mrol_map::geometry::Point;
 use mrol_map::map::{
-    CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
-    RequestKind, SHARDS,
+    CallerName, Change, Committed, DeletionRecord, MapName, MultiResolutionMap, Region, Request, RequestKind,
 };
 use mrol_map::util::StopSignal;
-use mrol_map::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
+use mrol_map::voxel::{VoxelKey, VoxelSet};
+
+impl MapService {
+    /// Takes voxels out, with all their descendants.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a point in no voxel, a key out of the level's range, a level that is none, too many
+    /// of them; `NotFound`; `ResourceExhausted` while the disk is nearly full.
+    pub async fn delete_voxels(
+        &self,
+        map: &MapName,
+        deletion: Deletion,
+    ) -> Result<DeletionAnswer, ServiceError> {
+        let work = async {
+            let map = self.map(map)?;
+            map.check_level(deletion.level)?;
+            match &deletion.target {
+                DeletionTarget::Points(points) => self.limits().check_points(points.len())?,
+                DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
+                DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => {}
+            }
+            // Who touched what since is read from the journal, as for an undo.
+            let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
+            let pool = if reads_journal { &self.inner.pools.undo } else { &self.inner.pools.mapping };
+            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
+            let (inner, deletion, caller) =
+                (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
+            let submit = move |stop: StopSignal<'_>| {
+                let submit = |stop: StopSignal<'_>| {
+                    map.submit_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
+                };
+                if reads_journal { limit.run(stop, submit) } else { submit(stop) }
+            };
+            self.submit_and_wait(pool, None, submit).await
+        };
+        self.observed("DeleteVoxels", Some(map), work, |answer| {
+            Outcome::Changed(observer::Change::of_deletion(answer))
+        })
+        .await
+    }
+}
 
 impl HostedMap {
     /// Sets a deletion on its way, unless it was done before.
@@ -71,44 +115,12 @@ impl HostedMap {
         Ok(Step::Submitted(outcome, Box::new(answer)))
     }
 
-    /// What came of a request the first time.
-    pub(super) fn answered(
-        &self,
-        kind: RequestKind,
-        request: Option<&Request>,
-        former_digest: u64,
-    ) -> Result<Option<CompletedRequest>, ServiceError> {
-        let Some(request) = request else {
-            return Ok(None);
-        };
-        match self.map.requests().find(kind, &request.id, request.caller.as_ref()) {
-            Some(answered) if ![request.digest, former_digest].contains(&answered.digest) => {
-                let message = format!(
-                    "request_id {} was accepted at revision {} with other content: name new requests anew",
-                    request.id, answered.revision
-                );
-                Err(ServiceError::new(Reason::RequestIdTaken, message))
-            }
-            answered => Ok(answered.cloned()),
-        }
-    }
-
-    /// Refuses or answers a request that came twice, where the other one was first.
-    pub(super) fn still_unanswered(
-        &self,
-        kind: RequestKind,
-        request: Option<&Request>,
-        former_digest: u64,
-    ) -> Result<(), Refusal> {
-        if self.answered(kind, request, former_digest)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
-    }
-
     fn targets_of(&self, deletion: &Deletion, stop: StopSignal<'_>) -> Result<VoxelSet, ServiceError> {
         let level = deletion.level;
         let keys: Vec<VoxelKey> = match &deletion.target {
             DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
             DeletionTarget::Keys(keys) => {
-                keys.iter().map(|&key| in_range("keys", key, level)).collect::<Result<_, _>>()?
+                keys.iter().map(|&key| key_in_range("keys", key, level)).collect::<Result<_, _>>()?
             }
             DeletionTarget::Region(region) | DeletionTarget::NotSeenSince(NotSeenSince { region, .. }) => {
                 let found = self.map.long_read().view().finest_in_until(region, level, stop);
@@ -122,7 +134,7 @@ impl HostedMap {
         let quantize = self.map.lattice().from_map();
         let keys: Option<Vec<_>> =
             points.iter().map(|&point| Some(quantize.key(point)?.ancestor(level))).collect();
-        keys.ok_or_else(|| self.point_without_voxel(points, &quantize))
+        keys.ok_or_else(|| point_without_voxel(points, &quantize, self.map.lattice()))
     }
 }
 
@@ -135,33 +147,6 @@ fn search_bytes(map: &MultiResolutionMap, deletion: &Deletion) -> u64 {
         DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => 0,
     };
     (named * (size_of::<VoxelKey>() + BLOCK_BYTES) + 2 * map.set_bytes()) as u64
-}
-
-/// Memory that taking voxels out takes: two copies of their blocks, their record, the keys of one shard's voxels with
-/// what their filters lose, and a copy of the filters' planes.
-pub(super) fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 {
-    const OF_RECORD: usize = 3;
-    const OF_SHARD: usize = 36;
-    let count = voxels.len();
-    let planes = map.plane_bytes().min(count * 64);
-    (2 * voxels.blocks().len() * BLOCK_BYTES + count * OF_RECORD + count * OF_SHARD / SHARDS + planes) as u64
-}
-
-/// A block's key and mask.
-const BLOCK_BYTES: usize = size_of::<(VoxelKey, BlockMask)>();
-
-/// The key, which is one of a voxel of `level`.
-pub(super) fn in_range(field: &str, key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
-    let range = INDEX_MIN >> level..=INDEX_MAX >> level;
-    if key.index().iter().all(|i| range.contains(i)) {
-        return Ok(key);
-    }
-    let message = format!(
-        "{field} has {key:?}, whose indices must lie in {}..={} at level {level}",
-        range.start(),
-        range.end()
-    );
-    Err(ServiceError::new(Reason::KeyOutOfRange, message))
 }
 
 /// Tells one request from another under the same id.

@@ -32,7 +32,7 @@ impl MapService {
         map: &MapName,
         query: EventsQuery,
     ) -> Result<Vec<Arc<ScanEvent>>, ServiceError> {
-        let work = async { Ok(self.map(map)?.events.list(&query)) };
+        let work = async { Ok(self.map(map)?.robots.events.list(&query)) };
         self.observed("ListEvents", Some(map), work, |_| Outcome::Read).await
     }
 
@@ -46,7 +46,7 @@ impl MapService {
             let limits = self.limits();
             let heartbeat = Duration::from_secs_f64(limits.watch_heartbeat_s);
             let unread_max_s = limits.watch_unread_max_s;
-            let (newest, waiting) = (map.events.newest(), Vec::new().into_iter());
+            let (newest, waiting) = (map.robots.events.newest(), Vec::new().into_iter());
             Ok(EventWatch { map, query, newest, waiting, heartbeat, is_greeted: false, unread_max_s })
         };
         self.observed("WatchEvents", Some(map), work, |_| Outcome::Read).await
@@ -93,7 +93,7 @@ impl Teller for EventWatch {
                 return Ok(EventMessage::Event(event));
             }
             self.newest.borrow_and_update();
-            self.waiting = self.map.events.list(&self.query).into_iter();
+            self.waiting = self.map.robots.events.list(&self.query).into_iter();
             if self.waiting.len() > 0 {
                 continue;
             }
@@ -150,7 +150,7 @@ impl<'a> PendingEvent<'a> {
             sample,
             answer,
         };
-        self.map.events.note(event, self.most);
+        self.map.robots.events.note(event, self.most);
     }
 }
 

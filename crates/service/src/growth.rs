@@ -1,7 +1,10 @@
-//! How much memory a map is to take, before it takes it.
+//! How much memory a change of a map is to take, before it takes it.
 
-use mrol_map::map::MapSettings;
-use mrol_map::voxel::VoxelSet;
+use mrol_map::map::{MapSettings, MultiResolutionMap, SHARDS};
+use mrol_map::voxel::{BlockMask, VoxelKey, VoxelSet};
+
+/// A block's key and mask.
+pub(super) const BLOCK_BYTES: usize = size_of::<(VoxelKey, BlockMask)>();
 
 /// The most memory by which `voxels`, with so many moments, were seen to make a map grow, the journal's record of them
 /// included: with every point alone in its block 800 bytes a point and its filters, where 650 with those of the default
@@ -12,6 +15,16 @@ pub(super) fn growth_bytes(settings: &MapSettings, voxels: &VoxelSet, moments: u
     const OF_MOMENTS: usize = 256;
     let bytes = voxels.blocks().len() * OF_BLOCK + voxels.len() * OF_VOXEL + moments * OF_MOMENTS;
     bytes as u64 + settings.filter_bytes_of(voxels)
+}
+
+/// Memory that taking voxels out takes: two copies of their blocks, their record, the keys of one shard's voxels with
+/// what their filters lose, and a copy of the filters' planes.
+pub(super) fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 {
+    const OF_RECORD: usize = 3;
+    const OF_SHARD: usize = 36;
+    let count = voxels.len();
+    let planes = map.plane_bytes().min(count * 64);
+    (2 * voxels.blocks().len() * BLOCK_BYTES + count * OF_RECORD + count * OF_SHARD / SHARDS + planes) as u64
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::commit_queue::{Decided, Refusal, Step, Submission};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
+use super::submission::{Decided, Refusal, Step, Submission};
 use super::{
     Change, DeleteKeepOut, KeepOutAnswer, KeepOutList, Limits, MapService, Outcome, PutKeepOut, Reason,
     ServiceError,

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::commit_queue::{Refusal, Submission};
 use super::hosted_map::HostedMap;
 use super::keep_out::decided;
 use super::resource_budget::ResourceBudget;
+use super::submission::{Refusal, Submission};
 use super::{MapService, ServiceError, commit_thread_ended};
 use mrol_map::map::{KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOuts, MultiResolutionMap};
 use mrol_map::util::StopSignal;
@@ -40,7 +40,7 @@ impl HostedMap {
     /// Ends the keep-outs whose time is up; how many ended. One that cannot be ended is left for the next call, and that is
     /// logged once.
     async fn expire_keep_outs(self: Arc<Self>, now_ns: i64, budget: &ResourceBudget) -> usize {
-        let Ok(_turn) = self.expiring.try_lock() else { return 0 };
+        let Ok(_attempt) = self.keep_out_expiry.lock.try_lock() else { return 0 };
         let Some(keep_outs) = self.map.try_keep_outs() else { return 0 };
         let mut ended = 0;
         for keep_out in keep_outs.expired(now_ns) {
@@ -52,7 +52,7 @@ impl HostedMap {
                 }
             }
         }
-        self.is_expiry_put_off.store(false, Ordering::Relaxed);
+        self.keep_out_expiry.is_put_off.store(false, Ordering::Relaxed);
         ended
     }
 
@@ -89,7 +89,7 @@ impl HostedMap {
     /// Says once why keep-outs do not end. Of a map that takes no more changes that is known.
     fn put_expiry_off(&self, name: &KeepOutName, why: &ServiceError) {
         let takes_changes = self.commit_queue.stopped().is_none();
-        if takes_changes && !self.is_expiry_put_off.swap(true, Ordering::Relaxed) {
+        if takes_changes && !self.keep_out_expiry.is_put_off.swap(true, Ordering::Relaxed) {
             let (map, why) = (&self.name, &why.message);
             tracing::warn!(%map, keep_out = %name, why, "keep-outs whose time is up stay for now");
         }
@@ -157,7 +157,10 @@ mod tests {
         assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
         let hosted = service.map(&map).unwrap();
         assert!(hosted.commit_queue.stopped().is_some() && !hosted.has_expired(i64::MAX));
-        assert!(!hosted.is_expiry_put_off.load(Ordering::Relaxed), "that it failed was said where it did");
+        assert!(
+            !hosted.keep_out_expiry.is_put_off.load(Ordering::Relaxed),
+            "that it failed was said where it did"
+        );
         assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
         assert_eq!(names(&service, &map).await, ["k0", "k1"]);
     }
@@ -166,7 +169,7 @@ mod tests {
     async fn a_map_that_is_being_asked_is_left_out_and_keeps_no_other_waiting() {
         let (service, map) = service_with(ServiceSettings::default(), &[NEVER_YET]).await;
         let hosted = service.map(&map).unwrap();
-        let turn = hosted.expiring.lock().await;
+        let turn = hosted.keep_out_expiry.lock.lock().await;
         let left_out = tokio::time::timeout(Duration::from_secs(20), service.expire_keep_outs(i64::MAX));
         assert_eq!(left_out.await.unwrap(), 0);
         drop(turn);

@@ -1,16 +1,21 @@
 //! Where a robot with no guess is in a map.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
-use super::{Limits, MapVersion, PointCloud, Reason, ServiceError, ServiceSettings, check_not_stopped};
+use super::{
+    Limits, MapService, MapVersion, Outcome, PointCloud, Reason, ServiceError, ServiceSettings,
+    check_not_stopped,
+};
 use mrol_map::align::Verdict;
 use mrol_map::align::localize::{
     Candidate, GravityError, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
     LocalizationSettings, Supervision, localize_supervised,
 };
 use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
 /// Share of the time limit after which a search ends, and what it found is refined.
@@ -142,6 +147,31 @@ impl LocalizationRequest {
         }
         self.time_limit = Some(time_limit);
         Ok(self)
+    }
+}
+
+impl MapService {
+    /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a scan without a usable point or with too many, a search box away from the map, a time
+    /// limit or number of candidates beyond the limits; `FailedPrecondition` where the map is empty;
+    /// `ResourceExhausted` where the map takes more than `localization_grid_bytes_max`, or there is no memory for the
+    /// search; `NotFound`.
+    pub async fn localize(
+        &self,
+        map: &MapName,
+        request: LocalizationRequest,
+    ) -> Result<LocalizationAnswer, ServiceError> {
+        let work = async {
+            let map = self.map(map)?;
+            let request = request.within(self.limits())?;
+            let inner = Arc::clone(&self.inner);
+            let search =
+                move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.budget, stop);
+            self.inner.pools.localization.run(search).await?
+        };
+        self.observed("Localize", Some(map), work, |_| Outcome::Read).await
     }
 }
 

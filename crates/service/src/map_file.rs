@@ -2,10 +2,11 @@
 
 use uuid::Uuid;
 
+use super::built_map::BuiltMap;
 use super::growth::growth_bytes;
-use super::hosted_map::{HostedMap, snapshot_bytes};
-use super::resource_budget::Reservation;
+use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
+use super::snapshots::snapshot_bytes;
 use super::{Limits, MapFile, Reason, ServiceError, ended_early};
 use mrol_map::map::MultiResolutionMap;
 use mrol_map::util::StopSignal;
@@ -22,7 +23,7 @@ impl HostedMap {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<MapFile, ServiceError> {
-        let _lent = budget.reserve_transient(self.snapshot_bytes(), "a map file")?;
+        let _lent = budget.reserve_transient(snapshot_bytes(&self.map), "a map file")?;
         let ended = || ended_early(stop);
         let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
         let encoded = snapshot.encode_until(stop);
@@ -39,14 +40,6 @@ impl HostedMap {
         }
         Ok(MapFile { bytes: bytes.into(), version: self.version(snapshot.contents.version()) })
     }
-}
-
-/// A map that was built of a file and is kept nowhere yet.
-pub(super) struct BuiltMap {
-    pub(super) uuid: Uuid,
-    pub(super) map: MultiResolutionMap,
-    /// Memory for its first snapshot.
-    pub(super) saving: Reservation,
 }
 
 /// What a file holds, as a map of its own. Memory is reserved for each part before it is built, so that a file which is

@@ -3,22 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::commit_queue::{Prepared, Step, Submission, Turn, TurnLimits, record_of};
-use super::deletion::removal_bytes;
+use super::commit_queue::TurnLimits;
 use super::filtered_scan::FilteredScan;
-use super::growth::growth_bytes;
+use super::growth::{growth_bytes, removal_bytes};
 use super::hosted_map::HostedMap;
-use super::point_query::bitmap;
-use super::recovery::recovery_settings;
+use super::request::{bitmap, scan_id_too_old, scan_name};
 use super::resource_budget::ResourceBudget;
-use super::trajectory::{scan_id_too_old, scan_name};
+use super::submission::{Prepared, RobotLock, Step, Submission, record_of};
 use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
-use mrol_map::align::{AlignmentSettings, Method, Verdict};
+use mrol_map::align::Verdict;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
-use mrol_map::mapping::{
-    Carving, LocatedScan, MappingError, MappingSettings, ScanMapper, ViewpointSettings, deskewed,
-};
+use mrol_map::mapping::{Carving, LocatedScan, MappingError, ScanMapper, deskewed};
 use mrol_map::util::StopSignal;
 use mrol_map::visibility::VIEWPOINT_MEMORY_MAX;
 
@@ -49,7 +45,7 @@ impl HostedMap {
     pub(super) fn submit_scan(
         self: &Arc<Self>,
         request: &ScanRequest,
-        turn: Turn,
+        robot_lock: RobotLock,
         effort: Effort,
         settings: &ServiceSettings,
         budget: &ResourceBudget,
@@ -76,9 +72,9 @@ impl HostedMap {
         let located = mapper.told(&scan.to_map(), recovered?);
         if located.is_accepted() || request.at_guess || request.force {
             // Where nobody asks for it any more, too.
-            self.lost.found(&request.robot);
+            self.robots.lost.found(&request.robot);
         }
-        self.sightings.note(&scan.to_map(), &located);
+        self.robots.sightings.note(&scan.to_map(), &located);
         let judged = self.judged(&scan, &located);
         if !judged.answer.accepted && !request.force {
             return Ok(Step::Answered(Some(judged)));
@@ -104,7 +100,8 @@ impl HostedMap {
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let limits = TurnLimits { carved_at, viewpoint_bytes_max: settings.limits.viewpoint_bytes_max };
-        let prepared = Prepared { change, record, if_empty: located.is_first, limits, turn, reservation };
+        let prepared =
+            Prepared { change, record, if_empty: located.is_first, limits, robot_lock, reservation };
         let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let judged = Judged { answer: ScanAnswer { points_skipped, ..judged.answer }, ..judged };
@@ -202,35 +199,6 @@ impl HostedMap {
             }
         };
         Err(ServiceError::new(reason, message))
-    }
-
-    /// How scans of this map are located and recorded: by the method that a request asks for, and with an eye on lost
-    /// robots where they are to be looked for.
-    pub(super) fn mapper(
-        &self,
-        method: Option<Method>,
-        recovers: bool,
-        settings: &ServiceSettings,
-    ) -> ScanMapper<'_> {
-        let method = method.unwrap_or(settings.alignment.method);
-        let alignment = AlignmentSettings { method, ..settings.alignment };
-        let mapper = ScanMapper::new(
-            &self.map,
-            &self.sightings,
-            MappingSettings {
-                alignment,
-                stationary: Some(settings.stationary),
-                viewpoints: ViewpointSettings {
-                    bytes_max: settings.limits.viewpoint_bytes_max,
-                    ..ViewpointSettings::default()
-                },
-                ..MappingSettings::default()
-            },
-        );
-        match recovers {
-            true => mapper.recovering(&self.lost, recovery_settings(&settings.limits)),
-            false => mapper,
-        }
     }
 
     /// Finds where the scan was taken.

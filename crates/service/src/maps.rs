@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::hosted_map::{HostedMap, Saving};
+use super::hosted_map::HostedMap;
 use super::map_file::from_file;
+use super::saving::Saving;
 use super::{
     AllowedMaps, Change, MapFile, MapInfo, MapService, Outcome, Reason, ServiceError, UnavailableMap,
 };
@@ -58,7 +59,7 @@ impl MapService {
     pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
         let work = async {
             let map = self.map(name)?;
-            let sightings = map.sightings.to_vec();
+            let sightings = map.robots.sightings.to_vec();
             Ok(MapInfo { sightings, ..self.describe(map).await? })
         };
         self.observed("GetMap", Some(name), work, |_| Outcome::Read).await

@@ -12,10 +12,12 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler};
 use shuttle::{Config, Runner, thread};
 use uuid::Uuid;
 
-use super::commit_queue::{CommitThread, Step};
-use super::hosted_map::{HostedMap, Saving};
+use super::commit_queue::CommitThread;
+use super::hosted_map::HostedMap;
 use super::mapping::Effort;
 use super::resource_budget::ResourceBudget;
+use super::saving::Saving;
+use super::submission::Step;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap, Region, RobotName};
@@ -51,9 +53,9 @@ fn insert_three(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>, robot: &str,
             at_guess: true,
             ..ScanRequest::new(RobotName::new(robot).unwrap(), points)
         };
-        let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
+        let robot_lock = Arc::new(block_on(map.robots.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
-        let step = map.submit_scan(&request, turn, Effort::Whole, &settings, budget, StopSignal::NEVER);
+        let step = map.submit_scan(&request, robot_lock, Effort::Whole, &settings, budget, StopSignal::NEVER);
         newest = outcome(step).unwrap().expect("a scan at its guess").answer.version.revision;
     }
     newest

@@ -6,9 +6,8 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use super::deletion::in_range;
 use super::hosted_map::HostedMap;
-use super::point_query::without_voxel;
+use super::request::{key_in_range, without_voxel};
 use super::resource_budget::ResourceBudget;
 use super::{
     Limits, MapService, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, Outcome, Reason,
@@ -58,7 +57,7 @@ impl HostedMap {
     fn observed_voxel(&self, request: &ObserversRequest) -> Result<VoxelKey, ServiceError> {
         let lattice = self.map.lattice();
         match request.voxel {
-            ObservedVoxel::Key(key) => in_range("key", key, request.level),
+            ObservedVoxel::Key(key) => key_in_range("key", key, request.level),
             ObservedVoxel::Of(point) => match lattice.from_map().key(point) {
                 Some(finest) => Ok(finest.ancestor(request.level)),
                 None => Err(without_voxel("point", point, lattice)),

@@ -16,11 +16,6 @@ use super::thread_queue::{HeldThread, ThreadQueue};
 use super::{Reason, ServiceError};
 use mrol_map::util::{Durations, SharedDurations, StopSignal};
 
-/// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
-/// over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a machine of
-/// now allows.
-pub(super) const INLINE_POINTS: usize = 10_240;
-
 /// How nice threads are to those of other pools: they get a tenth of a core that both want.
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;

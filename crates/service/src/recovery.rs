@@ -5,14 +5,15 @@
 //! Whether the robot is where the search saw it, its next scan tells.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::hosted_map::HostedMap;
-use super::localization::{SEARCH_SHARE, search_settings};
+use super::localization::SEARCH_SHARE;
+use super::mapper::seconds;
 use super::resource_budget::{Reservation, ResourceBudget};
-use super::{Limits, MapService, ScanRequest, ServiceSettings};
+use super::{MapService, ScanRequest, ServiceSettings};
 use mrol_map::align::localize::Supervision;
-use mrol_map::mapping::{RecoverySettings, ScanMapper, SearchTask};
+use mrol_map::mapping::{ScanMapper, SearchTask};
 use mrol_map::util::StopSignal;
 
 /// Whom a search's memory is lent to.
@@ -74,19 +75,4 @@ impl HostedMap {
             Err(error) => tracing::debug!(map, %error, "could not search for a lost robot"),
         }
     }
-}
-
-/// How lost robots are looked for on a server.
-pub(super) fn recovery_settings(limits: &Limits) -> RecoverySettings {
-    RecoverySettings {
-        localization: search_settings(limits.localization_grid_bytes_max),
-        keeps_tilt: true,
-        search_interval: seconds(limits.recovery_search_interval_s),
-        ..RecoverySettings::default()
-    }
-}
-
-/// The duration of a limit, which is checked when the settings are read.
-fn seconds(limit_s: f64) -> Duration {
-    Duration::from_secs_f64(limit_s)
 }

@@ -52,15 +52,16 @@ impl MapService {
         if map.is_new(scan) {
             self.inner.budget.check_to_grow()?;
         }
-        let turn = Arc::new(self.inner.pools.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
+        let robot_lock =
+            Arc::new(self.inner.pools.mapping.in_turn(map.robots.lock_robot(&scan.robot)).await?);
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
         let submit = |effort| {
             let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(map), Arc::clone(scan));
-            let (turn, limit) = (Arc::clone(&turn), limit.clone());
+            let (robot_lock, limit) = (Arc::clone(&robot_lock), limit.clone());
             move |stop: StopSignal<'_>| {
                 limit.run(stop, |stop| {
-                    let turn = Arc::clone(&turn);
-                    map.submit_scan(&scan, turn, effort, &inner.settings, &inner.budget, stop)
+                    let robot_lock = Arc::clone(&robot_lock);
+                    map.submit_scan(&scan, robot_lock, effort, &inner.settings, &inner.budget, stop)
                 })
             }
         };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::MapService;
-use crate::commit_queue::{Decided, Submission};
+use crate::submission::{Decided, Submission};
 use mrol_map::map::{Change, MapName, MultiResolutionMap};
 
 impl MapService {

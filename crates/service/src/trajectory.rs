@@ -9,7 +9,7 @@ use super::hosted_map::HostedMap;
 use super::{
     Limits, MapService, MapVersion, Outcome, Reason, ServiceError, TrajectoryAnswer, TrajectoryQuery,
 };
-use mrol_map::map::{MapName, RobotName, SessionName, Trajectory};
+use mrol_map::map::{MapName, RobotName, Trajectory};
 use mrol_map::util::StopSignal;
 
 /// Poses of one piece of a streamed trajectory.
@@ -157,23 +157,5 @@ impl HostedMap {
             trajectory.robots_known()
         );
         Err(ServiceError::new(Reason::TooManyRobots, message))
-    }
-}
-
-/// The error of a scan that was accepted so long ago that nothing is stored of it but its id, or may have been.
-pub(super) fn scan_id_too_old(robot: &RobotName, session: &SessionName, scan_id: u64) -> ServiceError {
-    let message = format!(
-        "{} is too old: a scan of that id was accepted, or may have been, before what undo reaches, and its answer is \
-         not stored; number new scans upwards, in a session with a new name after a restart",
-        scan_name(robot, session, scan_id)
-    );
-    ServiceError::new(Reason::ScanIdTooOld, message)
-}
-
-/// A scan, in errors.
-pub(super) fn scan_name(robot: &RobotName, session: &SessionName, scan_id: u64) -> String {
-    match session.is_empty() {
-        true => format!("scan_id {scan_id} of robot {robot}"),
-        false => format!("scan_id {scan_id} of session {session} of robot {robot}"),
     }
 }

@@ -4,21 +4,23 @@ use std::sync::Arc;
 
 use tokio::sync::OwnedMutexGuard;
 
-use super::commit_queue::{Decided, Refusal, Step, Stop, Submission, record_of};
-use super::deletion::removal_bytes;
 use super::digest::{Digest, FormerDigest};
-use super::growth::growth_bytes;
+use super::growth::{growth_bytes, removal_bytes};
 use super::hosted_map::HostedMap;
+use super::observer;
+use super::request::{scan_id_too_old, scan_name};
 use super::resource_budget::{Reservation, ResourceBudget};
+use super::submission::{Decided, Refusal, Step, Submission, record_of};
 use super::time_limit::TimeLimit;
-use super::trajectory::{scan_id_too_old, scan_name};
-use super::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
+use super::{
+    MapService, Outcome, Reason, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early,
+};
 use mrol_map::map::{
-    CallerName, Change, Committed, CompletedRequest, KnownScan, MultiResolutionMap, Request, RequestKind,
-    Reversal, UndoRecord, WithdrawnChange,
+    CallerName, Change, Committed, CompletedRequest, KnownScan, MapName, MultiResolutionMap, Request,
+    RequestKind, Reversal, UndoRecord, WithdrawnChange,
 };
 use mrol_map::util::StopSignal;
-use mrol_store::{MapFolder, NotObserved, Observed, Record, StoreError};
+use mrol_store::{MapFolder, NotObserved, Observed, Record};
 
 /// Whom memory is lent to, in refusals.
 const UNDO: &str = "an undo";
@@ -53,17 +55,48 @@ impl PlannedUndo {
     }
 }
 
+impl MapService {
+    /// Takes scans or a deletion back: the map is then what all other changes make of it, with the deletions as they were. Of
+    /// the voxels that a scan touched, those that no other scan holds go; those that a deletion took out come back.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map, scan or revision; `FailedPrecondition` for a change from before what undo reaches, for
+    /// a revision that an undo made, or where maps are kept in memory only; `ResourceExhausted` while the disk is nearly
+    /// full, where there is no memory to find out in what the map would be, or none for what comes back; `DeadlineExceeded`
+    /// with `time_limit` beyond `undo_time_max`.
+    pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+        let work = async {
+            self.scans.permit_undo(&undo.target)?;
+            let (map, undo) = (self.map(map)?, Arc::new(undo));
+            let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
+            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
+            // Until its outcome is known: what was withdrawn before it is then what it found.
+            let pool = &self.inner.pools.undo;
+            let _undo = pool.in_turn(map.lock_undo()).await?;
+            // A thread first: the robot's scans wait for this undo, and not for those of other maps.
+            let thread = pool.thread().await?;
+            let _robot = map.lock_robot_of(&undo.target).await;
+            self.submit_and_wait(pool, Some(thread), move |stop| {
+                limit.run(stop, |stop| map.submit_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
+            })
+            .await
+        };
+        self.observed("Undo", Some(map), work, |answer| Outcome::Changed(observer::Change::of_undo(answer)))
+            .await
+    }
+}
+
 impl HostedMap {
     /// Waits until the undos before are done.
-    pub(super) async fn turn_of_undo(&self) -> OwnedMutexGuard<()> {
-        Arc::clone(&self.undo_turn).lock_owned().await
+    pub(super) async fn lock_undo(&self) -> OwnedMutexGuard<()> {
+        Arc::clone(&self.undo_lock).lock_owned().await
     }
 
     /// Waits, before an undo of all scans of a robot, until its earlier scans are done: those that come later wait in turn,
     /// so that none that the undo does not know of lies before it.
-    pub(super) async fn turn_of_target(&self, target: &UndoTarget) -> Option<OwnedMutexGuard<()>> {
+    pub(super) async fn lock_robot_of(&self, target: &UndoTarget) -> Option<OwnedMutexGuard<()>> {
         match target {
-            UndoTarget::RobotSince { robot, .. } => Some(self.lock_robot(robot).await),
+            UndoTarget::RobotSince { robot, .. } => Some(self.robots.lock_robot(robot).await),
             UndoTarget::Scan { .. } | UndoTarget::Revision(_) => None,
         }
     }
@@ -249,21 +282,6 @@ impl HostedMap {
     fn no_scan(&self, what: &str) -> ServiceError {
         let message = format!("map {} has no accepted scan {what}", self.name);
         ServiceError::new(Reason::ScanNotFound, message)
-    }
-
-    /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
-    pub(super) fn unreadable(&self, error: &StoreError) -> ServiceError {
-        match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
-            true => Stop::Deleted.refusal(&self.name),
-            false => ServiceError::new(Reason::JournalUnreadable, error.to_string()),
-        }
-    }
-
-    /// Of a map in memory only, of which `what` would need the journal.
-    pub(super) fn no_journal(&self, what: &str) -> ServiceError {
-        let message =
-            format!("map {} is kept in memory only: {what} needs the journal of a data folder", self.name);
-        ServiceError::new(Reason::NoJournal, message)
     }
 
     fn outside_undo_window(

@@ -1,8 +1,8 @@
 //! Which voxels of a region no scan touched any more, although a viewpoint saw through them.
 
-use super::commit_queue::Refusal;
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
+use super::submission::Refusal;
 use super::{NotSeenSince, Reason, ServiceError, check_not_stopped, ended_early};
 use mrol_map::map::{Change, MultiResolutionMap, WithdrawnChange};
 use mrol_map::util::StopSignal;

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Named, not_stored};
-use crate::ServiceError;
 use crate::commit_queue::CommitThread;
-use crate::hosted_map::{HostedMap, thin};
+use crate::hosted_map::HostedMap;
+use crate::named::Named;
+use crate::snapshots::thin;
+use crate::{Reason, ServiceError};
 use mrol_map::map::MapName;
 use mrol_store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError, StoreSettings};
 
@@ -53,13 +54,6 @@ pub(super) fn open_all(
     Ok(maps)
 }
 
-impl Named {
-    fn set_unavailable(&mut self, name: MapName, error: &StoreError) {
-        tracing::error!(map = %name, %error, "cannot be opened: the map is unavailable, the others are served");
-        self.unavailable.insert(name, error.to_string());
-    }
-}
-
 /// Says what was found of a map.
 fn report(name: &MapName, opened: &OpenedMap, start: Instant) {
     for damaged in &opened.damaged {
@@ -81,4 +75,9 @@ fn report(name: &MapName, opened: &OpenedMap, start: Instant) {
     let (revision, replayed, snapshot) = (opened.map.revision(), opened.recovered.replayed, opened.snapshot);
     let (voxels, elapsed) = (opened.map.voxels(0), start.elapsed());
     tracing::info!(map = %name, revision, snapshot, replayed, voxels, ?elapsed, "opened");
+}
+
+/// The disk refused it.
+pub(super) fn not_stored(error: StoreError) -> ServiceError {
+    ServiceError::new(Reason::NotStored, error.to_string())
 }

@@ -3,30 +3,40 @@
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 
 use super::scan_turn::{ScanTurn, TurnLimits};
-use super::{
-    Decided, Decision, GROUP_MAX, Outcome, Prepared, Refusal, Stop, Submission, Told, Turn, Waiting,
-    outcome_unknown, record_of, revisions_used_up,
-};
 use crate::ServiceError;
-use crate::recent_changes::WatchedChange;
+use crate::recent_changes::{RecentChanges, WatchedChange};
 use crate::resource_budget::Reservation;
+use crate::stop::{Stop, outcome_unknown, revisions_used_up};
+use crate::submission::{
+    Decided, Decision, Outcome, Prepared, Refusal, RobotLock, Submission, Waiting, record_of,
+};
 use mrol_map::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use mrol_map::sync::mpsc::{Receiver, RecvTimeoutError};
 use mrol_map::util::{SharedDurations, StopSignal};
 use mrol_store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 
+/// Changes that share one sync, and as many that wait meanwhile; one more is refused.
+pub(super) const GROUP_MAX: usize = 256;
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
+
+/// Where a map's thread publishes each change that it made.
+pub(crate) struct Published {
+    /// The last revision, for those who wait for one.
+    pub(crate) announced: watch::Sender<u64>,
+    /// The last changes, for those who watch the map.
+    pub(crate) recent: Arc<RecentChanges>,
+}
 
 /// What a map's thread works with.
 pub(super) struct Worker {
     name: MapName,
     map: Arc<MultiResolutionMap>,
     folder: Option<Arc<MapFolder>>,
-    told: Told,
+    published: Published,
     stopped: Arc<OnceLock<Stop>>,
     durations: Arc<SharedDurations>,
     settings: StoreSettings,
@@ -42,7 +52,7 @@ struct Pending {
     record: Option<Record>,
     answer: oneshot::Sender<Outcome>,
     /// Kept until the change is visible.
-    _turn: Option<Turn>,
+    _robot_lock: Option<RobotLock>,
     _memory: Vec<Reservation>,
     _pin: Option<Pin>,
 }
@@ -52,14 +62,14 @@ impl Worker {
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
-        told: Told,
+        published: Published,
         stopped: Arc<OnceLock<Stop>>,
         durations: Arc<SharedDurations>,
         settings: &StoreSettings,
     ) -> Self {
         let thinned = map.revision();
         let settings = settings.clone();
-        Self { name, map, folder, told, stopped, durations, settings, unsynced: None, thinned }
+        Self { name, map, folder, published, stopped, durations, settings, unsynced: None, thinned }
     }
 
     /// Makes changes until nobody can send one any more.
@@ -92,7 +102,8 @@ impl Worker {
         for Waiting { submission, answer } in waiting {
             match submission {
                 Submission::Prepared(prepared) => {
-                    let Prepared { mut change, mut record, if_empty, limits, turn, reservation } = *prepared;
+                    let Prepared { mut change, mut record, if_empty, limits, robot_lock, reservation } =
+                        *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {
@@ -104,8 +115,8 @@ impl Worker {
                         drop(answer.send(Err(Refusal::Failed(error))));
                         continue;
                     }
-                    let (_turn, _memory) = (Some(turn), vec![reservation]);
-                    group.push(Pending { change, record, answer, _turn, _memory, _pin: None });
+                    let (_robot_lock, _memory) = (Some(robot_lock), vec![reservation]);
+                    group.push(Pending { change, record, answer, _robot_lock, _memory, _pin: None });
                 }
                 Submission::Undecided(decide) => {
                     self.commit_group(&mut group);
@@ -127,7 +138,7 @@ impl Worker {
     ) -> Result<(), ServiceError> {
         let Change::Insertion(scan) = &mut *change else { return Ok(()) };
         let before = group.iter().map(|pending| &pending.change).collect();
-        let turn = ScanTurn { map: &self.map, recent: &self.told.recent, before };
+        let turn = ScanTurn { map: &self.map, recent: &self.published.recent, before };
         if turn.cut(scan, limits) && record.is_some() {
             *record = Some(record_of(change)?);
         }
@@ -149,7 +160,7 @@ impl Worker {
         };
         match decided() {
             Ok(Some((change, record, _memory, _pin))) => {
-                group.push(Pending { change, record, answer, _turn: None, _memory, _pin });
+                group.push(Pending { change, record, answer, _robot_lock: None, _memory, _pin });
             }
             Ok(None) => drop(answer.send(Ok(unchanged))),
             Err(refusal) => drop(answer.send(Err(refusal))),
@@ -173,7 +184,7 @@ impl Worker {
             return;
         }
         for Pending { change, answer, .. } in group.drain(..) {
-            let Told { announced, recent } = &self.told;
+            let Published { announced, recent } = &self.published;
             let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
             debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
             announced.send_replace(committed.revision);
@@ -189,7 +200,7 @@ impl Worker {
     fn tell_durable(&self) {
         let visible = self.map.revision();
         let durable = self.folder.as_ref().map_or(visible, |folder| folder.used().durable.min(visible));
-        self.told.recent.tell_durable(durable);
+        self.published.recent.tell_durable(durable);
     }
 
     /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would

@@ -1,6 +1,9 @@
 //! Points as what is known of them: occupied, free, or unknown.
 
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
 use crate::{Limits, PointCloud, Reason, ServiceError};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{OutOfRange, PointStates, classify_points};

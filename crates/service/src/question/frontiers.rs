@@ -1,6 +1,9 @@
 //! Frontiers: where free space ends and nothing is known beyond.
 
-use super::{Asked, KnownPart, Question, QuestionedMap};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::Question;
+use super::questioned_map::QuestionedMap;
 use crate::{Limits, Reason, ServiceError};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{

@@ -1,6 +1,9 @@
 //! The nearest voxel of points.
 
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
 use crate::{Limits, PointCloud, Reason, ServiceError};
 use mrol_map::geometry::Point;
 use mrol_map::map::ContentVersion;

@@ -1,6 +1,9 @@
 //! Rays: what each meets first.
 
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
 use crate::{Limits, PointCloud, Reason, ServiceError};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{RayError, RayHits, Rays, Toward, Unknown, cast_rays, cast_rays_in_sight};

@@ -10,6 +10,7 @@
 //! A watcher is where it is: nothing waits for it, and nothing is kept for it. Its next message is made when there is room
 //! for it on the way to its client. Who falls behind the ring is told from the journal, and behind that of the whole state.
 
+mod state_parts;
 mod whole_state;
 
 use std::collections::VecDeque;
@@ -19,13 +20,13 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio_stream::Stream;
 
-use super::full_state::StateParts;
 use super::hosted_map::HostedMap;
 use super::outbox::{Teller, stream_of};
 use super::recent_changes::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, WatchedLevel};
 use super::{MapService, Outcome, ServiceError, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
+use state_parts::StateParts;
 
 /// Changes that are read from the journal at once, and bytes of memory after which no other is added to them.
 const BATCH_MAX: usize = 4096;
@@ -88,9 +89,9 @@ impl Watch {
         let WatchRequest { since, region, form, viewpoints } = request;
         let level = match form {
             WatchForm::Changes => None,
-            WatchForm::Deltas { level } => Some(map.recent.watch_level(level)),
+            WatchForm::Deltas { level } => Some(map.followers.recent.watch_level(level)),
         };
-        let durable = map.recent.durable();
+        let durable = map.followers.recent.durable();
         let head = *durable.borrow();
         // A revision that is not there, or of another map, is out of reach.
         let told = since.filter(|since| since.map_uuid == map.uuid && since.revision <= head);
@@ -131,7 +132,7 @@ impl Watch {
     /// Begins to tell of the change that made `revision`; where that is out of reach, the whole state is next.
     async fn begin_change(&mut self, revision: u64) -> Result<(), ServiceError> {
         let read = self.read.pop_front().filter(|change| change.revision == revision);
-        let Some(change) = read.or_else(|| self.map.recent.get(revision)) else {
+        let Some(change) = read.or_else(|| self.map.followers.recent.get(revision)) else {
             self.read_journal(revision).await?;
             if self.read.is_empty() {
                 self.told = None;

@@ -26,8 +26,11 @@ impl HostedMap {
             WatchForm::Changes => (None, 0),
             WatchForm::Deltas { level } => (Some(level), level),
         };
-        if let Some(known) =
-            self.full_states.get(key).filter(|state| self.recent.can_follow(state.version.revision, form))
+        if let Some(known) = self
+            .followers
+            .whole_states
+            .get(key)
+            .filter(|state| self.followers.recent.can_follow(state.version.revision, form))
         {
             return Ok(known);
         }
@@ -43,7 +46,7 @@ impl HostedMap {
         drop(long_read);
         check_not_stopped(stop)?;
         let state = Arc::new(FullState { version, level, voxels, keep_outs, viewpoints });
-        self.full_states.put(key, &state);
+        self.followers.whole_states.put(key, &state);
         Ok(state)
     }
 }
@@ -83,7 +86,7 @@ mod tests {
             watches.push(watch);
         }
         let hosted = service.map(&map).unwrap();
-        let state = hosted.full_states.get(None).expect("it is being told");
+        let state = hosted.followers.whole_states.get(None).expect("it is being told");
         assert_eq!(std::sync::Arc::strong_count(&state), WATCHERS as usize + 1);
         drop(watches);
         assert_eq!(std::sync::Arc::strong_count(&state), 1);
