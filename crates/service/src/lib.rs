@@ -1,95 +1,49 @@
 //! The operations of the server, once for every protocol: domain types in, domain types out.
 //!
 //! Limits are checked here and before any work is done; every failure is a [`ServiceError`].
+//!
+//! Reading order of the rooms; none names a room of a later line:
+//!
+//! 1. `error`, `limits`, `request`: how a request fails, how much it may ask, what it asks and how it is answered.
+//! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, who may ask, who is told, threads.
+//! 3. `commit`: how changes of a map become durable, then visible, then acknowledged.
+//! 4. `maps`: the maps by name, and what a hosted map is made of.
+//! 5. `map_service`: [`MapService`], the handle of which every operation is a method.
+//! 6. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.
 
-mod allowed_maps;
-mod allowed_scans;
-mod asker;
-mod block;
-mod built_map;
-mod catalog;
-mod commit_queue;
-mod completed_request;
-mod deletion;
-mod digest;
+mod caller;
+mod change;
+mod commit;
 mod error;
-mod error_code;
-mod event_log;
-mod events;
-mod expiry_state;
-mod filtered_scan;
-mod followers;
-mod full_state;
-mod gauges;
-mod growth;
-mod hosted_map;
-mod keep_out;
-mod keep_out_expiry;
+mod lifecycle;
 mod limits;
-mod listing;
-mod localization;
-#[cfg(test)]
-mod looks;
-mod map_file;
 mod map_service;
-mod mapper;
-mod mapping;
 mod maps;
-#[cfg(all(test, feature = "shuttle"))]
-mod modeled;
-mod named;
 mod observer;
-mod observers;
-mod outbox;
-mod point_query;
-mod pool;
-mod pools;
 mod question;
-mod reason;
-mod recent_changes;
-mod recovery;
+mod read;
 mod request;
-mod resource_budget;
-mod robots;
-mod saving;
-mod scans;
+mod resources;
+mod scan;
 mod settings;
-mod shortage;
-mod snapshots;
-mod stop;
-mod submission;
 #[cfg(feature = "testing")]
 mod testing;
-mod thread_queue;
-mod time_limit;
-mod trajectory;
-mod undo;
-mod unseen;
+#[cfg(test)]
+mod tests;
 mod watch;
-mod watermarks;
+mod work;
 
-pub use allowed_maps::AllowedMaps;
-pub use allowed_scans::AllowedScans;
-pub use asker::Asker;
-pub use error::ServiceError;
-pub use error_code::ErrorCode;
-pub use event_log::EVENTS_MAX;
-pub use events::EventWatch;
-pub use gauges::{Gauges, MemoryReading, Readings};
+pub use caller::{AllowedMaps, AllowedScans};
+pub use error::{ErrorCode, Reason, ServiceError, ToldBy};
 pub use limits::{Limits, Marks};
-pub use localization::{
-    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
-    TIME_LIMIT_DEFAULT,
-};
 pub use map_service::MapService;
+pub use maps::EVENTS_MAX;
 pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};
-pub use pool::PoolUse;
 pub use question::{
     Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
     GridQuestion, GridScope, KnownPart, MotionCheck, NearestQuestion, PoseCheck, Question, QuestionedMap,
     RayQuestion, RaysToward, SphereCheck,
 };
-pub use reason::{Reason, ToldBy};
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
     Deletion, DeletionAnswer, DeletionTarget, EventMessage, EventsQuery, FailedScan, Foreground,
@@ -100,10 +54,11 @@ pub use request::{
     VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
     WatchedViewpoint,
 };
+pub use resources::{Gauges, MemoryReading, Readings, Shortage};
+pub use scan::{
+    CANDIDATES_DEFAULT, CandidateAnswer, EventWatch, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
+    TIME_LIMIT_DEFAULT, TrajectoryPieces,
+};
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
-pub use shortage::Shortage;
-pub use trajectory::TrajectoryPieces;
 pub use watch::Watch;
-
-pub(crate) use map_service::{Inner, commit_thread_ended};
-pub(crate) use time_limit::{check_not_stopped, ended_early};
+pub use work::{Asker, PoolUse};

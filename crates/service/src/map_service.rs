@@ -1,17 +1,17 @@
-//! The service: maps of a data folder, and on whose behalf they are named. Its operations are in the files of their kind.
+//! A handle on the service: its maps, and the caller on whose behalf they are named. Its operations are `impl MapService`
+//! blocks in the rooms of their kind.
 
 use std::sync::Arc;
 
-use super::catalog::Catalog;
-use super::hosted_map::HostedMap;
-use super::pool::{FreeThread, Pool};
-use super::pools::Pools;
-use super::resource_budget::ResourceBudget;
-use super::submission::{Refusal, Step};
-use super::{
-    AllowedMaps, AllowedScans, Asker, End, Ended, Limits, Outcome, PoolUse, Readings, Reason, ServiceError,
-    ServiceSettings, Shortage,
-};
+use super::caller::{AllowedMaps, AllowedScans};
+use super::commit::{Refusal, Step};
+use super::error::{Reason, ServiceError};
+use super::limits::Limits;
+use super::maps::{Catalog, HostedMap};
+use super::observer::{End, Ended, Outcome};
+use super::resources::{Readings, ResourceBudget, Shortage};
+use super::settings::ServiceSettings;
+use super::work::{Asker, FreeThread, Pool, PoolUse, Pools};
 use mrol_map::map::{CallerName, MapName};
 use mrol_map::util::StopSignal;
 use mrol_store::OpeningProgress;

@@ -3,7 +3,8 @@
 use std::fmt::Debug;
 use std::time::Duration;
 
-use super::{DeletionAnswer, KeepOutAnswer, MapVersion, ServiceError, UndoAnswer};
+use super::error::ServiceError;
+use super::request::{DeletionAnswer, KeepOutAnswer, MapVersion, UndoAnswer};
 use mrol_map::align::Verdict;
 use mrol_map::map::{CallerName, Lookup, MapName, RobotName};
 use mrol_map::mapping::Recovered;

@@ -6,9 +6,12 @@ use std::time::{Duration, Instant};
 use super::asked::{Answered, Asked};
 use super::planner_question::Question;
 use super::questioned_map::QuestionedMap;
-use crate::hosted_map::HostedMap;
-use crate::time_limit::TimeLimit;
-use crate::{Inner, Limits, MapService, Outcome, Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
+use crate::map_service::{Inner, MapService};
+use crate::maps::HostedMap;
+use crate::observer::Outcome;
+use crate::work::TimeLimit;
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
@@ -124,7 +127,8 @@ mod tests {
     use crate::question::check::CheckAs;
     use crate::question::poses::PoseCheck;
     use crate::question::rays::{RayQuestion, RaysToward};
-    use crate::{PointCloud, ServiceSettings};
+    use crate::request::PointCloud;
+    use crate::settings::ServiceSettings;
     use mrol_map::geometry::Point;
     use mrol_map::map::{MapContents, MapSettings, MultiResolutionMap};
     use mrol_map::planning::{Body, Link, Sphere, Surroundings, Unknown};

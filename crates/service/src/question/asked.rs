@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::MapVersion;
+use crate::request::MapVersion;
 
 /// What all questions have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -4,7 +4,8 @@ use super::asked::Asked;
 use super::known::KnownPart;
 use super::planner_question::Question;
 use super::questioned_map::QuestionedMap;
-use crate::{Limits, Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, Frontiers, STANDOFF_VOXELS,

@@ -7,7 +7,9 @@ use super::check::check_ignored;
 use super::known::KnownPart;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
-use crate::{Limits, ServiceError, check_not_stopped, ended_early};
+use crate::error::ServiceError;
+use crate::limits::Limits;
+use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
     Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings, prepared_bytes,

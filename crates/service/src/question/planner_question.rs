@@ -5,7 +5,8 @@ use std::fmt::Debug;
 use super::asked::Asked;
 use super::known::KnownPart;
 use super::questioned_map::QuestionedMap;
-use crate::{Limits, Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
 use mrol_map::map::ContentVersion;
 use mrol_map::util::StopSignal;
 

@@ -7,7 +7,9 @@ use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_mos
 use super::known::KnownPart;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
-use crate::{Limits, ServiceError, check_not_stopped, ended_early};
+use crate::error::ServiceError;
+use crate::limits::Limits;
+use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{Body, Configurations, NUMBERS_PER_POSE, PoseQuestion, Surroundings};
 use mrol_map::util::StopSignal;

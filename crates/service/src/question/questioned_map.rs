@@ -3,7 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use super::asked::Asked;
-use crate::{ServiceError, check_not_stopped, ended_early};
+use crate::error::ServiceError;
+use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::{ContentVersion, MapView, MultiResolutionMap};
 use mrol_map::planning::{Planner, PlanningView, Surroundings, Unknown};
 use mrol_map::util::StopSignal;

@@ -1,4 +1,4 @@
-//! Bits of points as they are sent.
+//! Bits of a request's points, as bytes of its answer.
 
 use bytes::Bytes;
 

@@ -1,6 +1,6 @@
-//! How errors name a scan.
+//! The name of a scan in errors.
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::map::{RobotName, SessionName};
 
 /// The error of a scan that was accepted so long ago that nothing is stored of it but its id, or may have been.

@@ -1,6 +1,6 @@
-//! What is said of a point that falls in no voxel, and of a key that is none of its level.
+//! The errors of points that fall in no voxel, and of keys out of their level's range.
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::geometry::Point;
 use mrol_map::voxel::{INDEX_MAX, INDEX_MIN, Lattice, LatticeFromPoints, VoxelKey};
 

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::full_state::FullState;
-use crate::recent_changes::{BLOCKS_PER_PART, Watched, has_looked_into};
-use crate::{BlockBytes, StatePart, WatchedViewpoint};
+use crate::commit::{BLOCKS_PER_PART, Watched, has_looked_into};
+use crate::maps::FullState;
+use crate::request::{BlockBytes, StatePart, WatchedViewpoint};
 use mrol_map::map::blocks_in;
 use mrol_map::voxel::Lattice;
 

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::full_state::FullState;
-use crate::hosted_map::HostedMap;
-use crate::resource_budget::ResourceBudget;
-use crate::{BlockBytes, ServiceError, WatchForm, check_not_stopped};
+use crate::error::ServiceError;
+use crate::maps::{FullState, HostedMap};
+use crate::request::{BlockBytes, WatchForm};
+use crate::resources::ResourceBudget;
+use crate::work::check_not_stopped;
 use mrol_map::util::StopSignal;
 
 /// Whom memory is lent to, in refusals.
 const WATCH: &str = "a watch";
 /// Bytes of memory of a block.
-const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
+pub(crate) const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
 
 impl HostedMap {
     /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those who
@@ -53,7 +54,9 @@ impl HostedMap {
 
 #[cfg(test)]
 mod tests {
-    use crate::{MapService, ScanRequest, ServiceSettings, WatchEvent, WatchRequest};
+    use crate::map_service::MapService;
+    use crate::request::{ScanRequest, WatchEvent, WatchRequest};
+    use crate::settings::ServiceSettings;
     use mrol_map::geometry::{Point, Pose};
     use mrol_map::map::{MapName, MapSettings, Region, RobotName};
     use mrol_map::mapping::Guess;
