@@ -1,11 +1,17 @@
 //! Tests of the check of folders.
 
-use super::*;
-use crate::{Record, StoreSettings};
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::diagnose::diagnose;
+use super::diagnosis::Diagnosis;
+use super::set_aside::{SetAside, set_aside};
+use crate::{DataDir, OpeningProgress, Record, Snapshot, StoreSettings, snapshot_files};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{
-    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, Region,
-    RobotName, ScanRecord, ViewpointRecord,
+    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapName, MapSettings,
+    MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord, ViewpointRecord,
 };
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 use mrol_map::voxel::VoxelSet;

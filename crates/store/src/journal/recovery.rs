@@ -188,8 +188,9 @@ impl Segment<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::journal::Journal;
-    use crate::{Disk, Record, StoreSettings};
+    use crate::journal::log::Journal;
+    use crate::journal::record::Record;
+    use crate::{Disk, StoreSettings};
     use mrol_map::geometry::Pose;
     use mrol_map::map::{MappedScan, RobotName, ScanRecord};
     use mrol_map::voxel::VoxelSet;

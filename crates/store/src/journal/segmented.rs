@@ -7,9 +7,11 @@ use std::time::Instant;
 
 use uuid::Uuid;
 
+use super::frame;
 use super::frame::Frame;
+use super::log::{Changes, Journal, StoredRecords};
+use super::record::Record;
 use super::segment::{self, Frames};
-use super::{Changes, Journal, Record, StoredRecords, frame};
 use crate::codec::Unreadable;
 use crate::folder::{self, FolderPath};
 use crate::{Appending, FileSystem, OpeningProgress, StoreError};

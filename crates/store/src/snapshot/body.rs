@@ -6,11 +6,11 @@ use std::sync::Arc;
 use prost::Message;
 use uuid::Uuid;
 
-use super::Snapshot;
 use super::fields::{
     FIELDS_PER_LOOK, Fields, Value, bytes_of, count_bytes, count_varints, unzigzag, varints,
 };
 use super::limits::{MapFileError, MapFileLimits, Memory};
+use super::whole_map::Snapshot;
 use crate::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::pb;
 use mrol_map::bloom::FilterSettings;

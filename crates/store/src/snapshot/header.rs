@@ -2,10 +2,16 @@
 
 use uuid::Uuid;
 
-use super::FORMAT_VERSION;
 use crate::codec::Unreadable;
 use crate::compression::checksum_after;
 use mrol_map::util::StopSignal;
+
+/// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
+/// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
+/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
+/// version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and moments; up to
+/// version 7 there are no viewpoints.
+pub const FORMAT_VERSION: u32 = 8;
 
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 /// Bytes of the header up to version 3, from version 4 on, and from version 8 on.

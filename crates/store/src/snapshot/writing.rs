@@ -4,8 +4,8 @@
 use prost::Message;
 use prost::encoding::{WireType, encode_key, encode_varint, encoded_len_varint, key_len};
 
-use super::Snapshot;
 use super::body::number;
+use super::whole_map::Snapshot;
 use crate::codec::{moments, voxels};
 use crate::pb;
 use mrol_map::map::MapContents;
