@@ -4,12 +4,13 @@
 
 mod change;
 mod keep_out;
-pub(super) mod moments;
+pub(crate) mod moments;
 mod scan;
 mod unreadable;
 mod viewpoint;
-pub(super) mod voxels;
+pub(crate) mod voxels;
 
-pub(super) use scan::with_forgotten;
-pub(super) use unreadable::{Unreadable, required};
-pub(super) use viewpoint::{ascending_from, gaps_of};
+pub(crate) use scan::with_forgotten;
+pub(crate) use unreadable::{Unreadable, required};
+pub(crate) use viewpoint::{ascending_from, gaps_of};
+pub(crate) use voxels::blocks_of;

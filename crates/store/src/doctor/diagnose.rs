@@ -5,8 +5,12 @@ use std::sync::Arc;
 
 use super::diagnosis::{AsideFile, Diagnosis};
 use super::replay::Replay;
+use crate::data_folder::DataDir;
 use crate::entry::Entry;
-use crate::{DataDir, FileSystem, Snapshot, StoreError, snapshot, snapshot_files, viewpoint_parts};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::snapshots::{self, Snapshot};
+use crate::{map_files, viewpoint_parts};
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
@@ -24,7 +28,7 @@ pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreEr
     };
     let mut diagnosis = Diagnosis {
         set_aside: aside_files(&**files, &path)?,
-        not_understood: snapshot_files::not_understood(&**files, &path)?,
+        not_understood: map_files::not_understood(&**files, &path)?,
         ..Diagnosis::default()
     };
     let mut snapshots = read_snapshots(&**files, &path, &mut diagnosis)?;
@@ -60,7 +64,7 @@ fn aside_files(files: &dyn FileSystem, path: &Path) -> Result<Vec<AsideFile>, St
         let bytes = files.size(&path.join(&name)).map_err(StoreError::io(path.join(&name)))?;
         Ok(AsideFile { name, bytes })
     };
-    snapshot_files::set_aside_in(files, path)?.into_iter().map(file).collect()
+    map_files::set_aside_in(files, path)?.into_iter().map(file).collect()
 }
 
 /// The snapshots that can be read, newest first.
@@ -74,8 +78,8 @@ pub(super) fn read_snapshots(
         Entry::Map { uuid, .. } => Some(uuid),
         _ => None,
     };
-    for revision in snapshot_files::snapshot_revisions(files, path)?.into_iter().rev() {
-        let file = path.join(snapshot_files::snapshot_name(revision));
+    for revision in map_files::snapshot_revisions(files, path)?.into_iter().rev() {
+        let file = path.join(map_files::snapshot_name(revision));
         let bytes = files.read(&file).map_err(StoreError::io(&file))?;
         let decoded = Snapshot::decode_own(&bytes, StopSignal::NEVER)?;
         match decoded.map_err(|reason| StoreError::damaged(&file, reason)) {
@@ -96,7 +100,7 @@ pub(super) fn read_snapshots(
                     let viewpoints = viewpoint_parts::load_readable(files, path, snapshot.uuid, &parts, note);
                     snapshot.contents.viewpoints = Arc::new(viewpoints);
                 }
-                let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
+                let head = snapshots::head_of(&bytes).unwrap_or_default().max(revision);
                 diagnosis.acknowledged = diagnosis.acknowledged.max(head);
                 snapshots.push(snapshot);
             }

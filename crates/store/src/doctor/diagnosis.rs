@@ -1,6 +1,6 @@
 //! Findings about a map.
 
-use crate::StoreError;
+use crate::error::StoreError;
 
 /// Findings about a map.
 #[derive(Debug, Default)]

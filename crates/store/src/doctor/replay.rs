@@ -6,9 +6,11 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::diagnosis::Diagnosis;
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
 use crate::folder::FolderPath;
 use crate::journal::{self, Inspected};
-use crate::{FileSystem, Snapshot, StoreError};
+use crate::snapshots::Snapshot;
 use mrol_map::map::{MapContents, MappedScan, MultiResolutionMap};
 
 /// A map that is rebuilt from its oldest snapshot.

@@ -8,7 +8,11 @@ use uuid::Uuid;
 use super::diagnose::read_snapshots;
 use super::diagnosis::Diagnosis;
 use super::replay::Replay;
-use crate::{DataDir, DataDirContents, FileSystem, OpeningProgress, Snapshot, StoreError};
+use crate::data_folder::{DataDir, DataDirContents};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::progress::OpeningProgress;
+use crate::snapshots::Snapshot;
 use mrol_map::map::{MapName, MultiResolutionMap};
 
 /// Result of [`set_aside`].

@@ -1,8 +1,8 @@
-//! What a journal is: a log of changes.
+//! The trait of journals, and what they read.
 
 use super::mention::StoredRecord;
 use super::record::Record;
-use crate::StoreError;
+use crate::error::StoreError;
 use mrol_map::map::Change;
 
 /// A change with the revision that it made.

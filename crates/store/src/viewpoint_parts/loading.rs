@@ -7,7 +7,9 @@ use uuid::Uuid;
 use super::file::{ViewpointPart, part_names, part_number};
 use super::known_part::KnownPart;
 use super::uses::PartUse;
-use crate::{FileSystem, StoreError, folder};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder;
 use mrol_map::util::StopSignal;
 use mrol_map::visibility::ViewpointSet;
 

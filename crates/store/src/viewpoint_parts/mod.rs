@@ -23,7 +23,7 @@ mod plan;
 mod tests;
 mod uses;
 
-pub(super) use file::{PART_HEADER_BYTES, owner_of_part, part_names, part_number};
-pub(super) use loading::{LoadedParts, bytes_of, load, load_readable, numbers_in};
-pub(super) use plan::ViewpointParts;
-pub(super) use uses::{PartUse, section_of, uses_in};
+pub(crate) use file::{PART_HEADER_BYTES, owner_of_part, part_names, part_number};
+pub(crate) use loading::{LoadedParts, bytes_of, load, load_readable, numbers_in};
+pub(crate) use plan::ViewpointParts;
+pub(crate) use uses::{PartUse, section_of, uses_in};

@@ -1,25 +1,4 @@
-//! The folder of one map: snapshots, and the journal that continues from them.
-//!
-//! ```text
-//! office.UUID/snapshot-00000000000000000000.mrol      at that revision
-//! office.UUID/snapshot-00000000000000004711.mrol
-//! office.UUID/journal-00000000000000000001.log        from that revision on
-//! office.UUID/journal-00000000000000004712.log
-//! office.UUID/viewpoints-00000000000000000003.part    see `viewpoint_parts`
-//! ```
-//!
-//! Two locks are held while files are written, one for the snapshots and one for the journal; only writers wait for
-//! them. What readers ask is in [`Facts`].
-
-mod facts;
-mod newest_first;
-mod observing;
-mod opening;
-
-pub use facts::{FolderUse, Pin};
-pub use newest_first::JournalPart;
-pub use observing::{NotObserved, Observed};
-pub use opening::OpenedMap;
+//! A map's folder in use: changes are appended, snapshots written, and what is no longer needed removed.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,44 +6,47 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use uuid::Uuid;
 
-use super::folder::FolderPath;
-use super::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
+use super::facts::{Facts, FolderUse};
 use super::retention::UndoWindow;
 use super::snapshot_files::{Sizes, forget_damaged, snapshot_name, unneeded_parts};
-use super::viewpoint_parts::{ViewpointParts, part_names, section_of};
-use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
-use facts::Facts;
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder::{self, FolderPath};
+use crate::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
+use crate::settings::StoreSettings;
+use crate::snapshots::{self, Snapshot};
+use crate::viewpoint_parts::{ViewpointParts, part_names, section_of};
 use mrol_map::map::WithdrawnChange;
 use mrol_map::sync::{Mutex, Rank};
 
 /// A map's folder: keeps the map across crashes.
 #[derive(Debug)]
 pub struct MapFolder {
-    files: Arc<dyn FileSystem>,
+    pub(crate) files: Arc<dyn FileSystem>,
     uuid: Uuid,
-    path: FolderPath,
+    pub(crate) path: FolderPath,
     settings: StoreSettings,
     /// Location of the journal's segments.
-    place: SegmentFolder,
+    pub(crate) place: SegmentFolder,
     journal: Mutex<SegmentedJournal>,
     /// The parts that the newest snapshot names. Held while a snapshot is written, or old ones are removed.
     snapshots: Mutex<ViewpointParts>,
     /// True once the folder was deleted. Changed while both locks are held.
     is_gone: AtomicBool,
-    facts: Facts,
+    pub(crate) facts: Facts,
 }
 
 /// What a folder has when it is opened.
-struct Found {
+pub(crate) struct Found {
     /// Revisions of the snapshots, ascending.
-    snapshots: Vec<u64>,
-    parts: ViewpointParts,
+    pub(crate) snapshots: Vec<u64>,
+    pub(crate) parts: ViewpointParts,
     /// Bytes of journal after the newest snapshot.
-    journal_bytes: u64,
+    pub(crate) journal_bytes: u64,
 }
 
 impl MapFolder {
-    fn with(
+    pub(crate) fn with(
         files: Arc<dyn FileSystem>,
         uuid: Uuid,
         path: FolderPath,
@@ -164,7 +146,7 @@ impl MapFolder {
         })?;
         // What was acknowledged during the encoding is only in the journal: opening the map must notice where that is
         // missing.
-        snapshot::complete(&mut file, head.max(revision), &section_of(&plan.uses(written.as_ref())));
+        snapshots::complete(&mut file, head.max(revision), &section_of(&plan.uses(written.as_ref())));
         parts.use_up_number(&plan);
         let write = || {
             if let (Some(written), Some(part)) = (&written, &part) {
@@ -275,11 +257,11 @@ impl MapFolder {
         if self.is_gone() { Err(StoreError::Gone) } else { Ok(()) }
     }
 
-    pub(super) fn uuid(&self) -> Uuid {
+    pub(crate) fn uuid(&self) -> Uuid {
         self.uuid
     }
 
-    pub(super) fn path(&self) -> PathBuf {
+    pub(crate) fn path(&self) -> PathBuf {
         self.path.get()
     }
 
@@ -287,7 +269,7 @@ impl MapFolder {
     ///
     /// # Errors
     /// When the system refuses; as far as can be known, the folder then has its former name.
-    pub(super) fn move_to(&self, to: &Path) -> Result<(), StoreError> {
+    pub(crate) fn move_to(&self, to: &Path) -> Result<(), StoreError> {
         let _writing = self.snapshots.lock();
         let _appending = self.journal.lock();
         let from = self.path.get();
@@ -308,7 +290,7 @@ impl MapFolder {
     ///
     /// # Errors
     /// When the system refuses; it is then as it was.
-    pub(super) fn take_away(&self, to: &Path) -> Result<(), StoreError> {
+    pub(crate) fn take_away(&self, to: &Path) -> Result<(), StoreError> {
         let _writing = self.snapshots.lock();
         let _appending = self.journal.lock();
         self.check_there()?;

@@ -1,4 +1,4 @@
-//! A whole map at one revision, as it is stored.
+//! A whole map at one revision.
 
 use uuid::Uuid;
 

@@ -10,7 +10,7 @@ use super::fields::{
     FIELDS_PER_LOOK, Fields, Value, bytes_of, count_bytes, count_varints, unzigzag, varints,
 };
 use super::limits::{MapFileError, MapFileLimits, Memory};
-use super::whole_map::Snapshot;
+use super::snapshot::Snapshot;
 use crate::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::pb;
 use mrol_map::bloom::FilterSettings;
@@ -23,36 +23,36 @@ use mrol_map::voxel::{BLOCKS_PER_LOOK, BlockMask, MOMENT_LEVEL, MomentSet, Momen
 
 /// Field numbers, as in `proto/mrol/store/v1`.
 pub(super) mod number {
-    pub(in crate::snapshot) const UUID: u64 = 1;
-    pub(in crate::snapshot) const RESOLUTION_M: u64 = 2;
-    pub(in crate::snapshot) const LEVELS: u64 = 3;
-    pub(in crate::snapshot) const FILTER_HASHES: u64 = 4;
-    pub(in crate::snapshot) const FILTER_BITS_PER_KEY: u64 = 5;
-    pub(in crate::snapshot) const REVISION: u64 = 6;
-    pub(in crate::snapshot) const BLOCK_KEYS: u64 = 7;
-    pub(in crate::snapshot) const BLOCK_MASKS: u64 = 8;
-    pub(in crate::snapshot) const TRAJECTORY: u64 = 9;
-    pub(in crate::snapshot) const VOXELS: u64 = 10;
-    pub(in crate::snapshot) const WITHDRAWN: u64 = 11;
-    pub(in crate::snapshot) const REQUESTS: u64 = 12;
-    pub(in crate::snapshot) const MOMENTS: u64 = 13;
-    pub(in crate::snapshot) const FORGOTTEN: u64 = 14;
-    pub(in crate::snapshot) const KEEP_OUTS: u64 = 15;
-    pub(in crate::snapshot) const NO_FILTER: u64 = 16;
-    pub(in crate::snapshot) const NO_MOMENTS: u64 = 17;
-    pub(in crate::snapshot) const VIEWPOINTS: u64 = 18;
+    pub(in crate::snapshots) const UUID: u64 = 1;
+    pub(in crate::snapshots) const RESOLUTION_M: u64 = 2;
+    pub(in crate::snapshots) const LEVELS: u64 = 3;
+    pub(in crate::snapshots) const FILTER_HASHES: u64 = 4;
+    pub(in crate::snapshots) const FILTER_BITS_PER_KEY: u64 = 5;
+    pub(in crate::snapshots) const REVISION: u64 = 6;
+    pub(in crate::snapshots) const BLOCK_KEYS: u64 = 7;
+    pub(in crate::snapshots) const BLOCK_MASKS: u64 = 8;
+    pub(in crate::snapshots) const TRAJECTORY: u64 = 9;
+    pub(in crate::snapshots) const VOXELS: u64 = 10;
+    pub(in crate::snapshots) const WITHDRAWN: u64 = 11;
+    pub(in crate::snapshots) const REQUESTS: u64 = 12;
+    pub(in crate::snapshots) const MOMENTS: u64 = 13;
+    pub(in crate::snapshots) const FORGOTTEN: u64 = 14;
+    pub(in crate::snapshots) const KEEP_OUTS: u64 = 15;
+    pub(in crate::snapshots) const NO_FILTER: u64 = 16;
+    pub(in crate::snapshots) const NO_MOMENTS: u64 = 17;
+    pub(in crate::snapshots) const VIEWPOINTS: u64 = 18;
 
     /// Field of `Voxels` and of `Moments`.
-    pub(in crate::snapshot) const KEY_GAPS: u64 = 1;
+    pub(in crate::snapshots) const KEY_GAPS: u64 = 1;
     /// Field of `Voxels`.
-    pub(in crate::snapshot) const OCTREES: u64 = 2;
+    pub(in crate::snapshots) const OCTREES: u64 = 2;
     /// Field of `Moments`.
-    pub(in crate::snapshot) const NUMBERS: u64 = 2;
-    pub(in crate::snapshot) const FORMS: u64 = 3;
-    pub(in crate::snapshot) const POINTS: u64 = 4;
+    pub(in crate::snapshots) const NUMBERS: u64 = 2;
+    pub(in crate::snapshots) const FORMS: u64 = 3;
+    pub(in crate::snapshots) const POINTS: u64 = 4;
 
     /// Field of `ForgottenScans`.
-    pub(in crate::snapshot) const ID_GAPS: u64 = 2;
+    pub(in crate::snapshots) const ID_GAPS: u64 = 2;
 }
 
 /// Scans that are added to a trajectory between two checks of the stop signal: a few milliseconds.

@@ -7,11 +7,13 @@ use std::sync::Arc;
 use super::body::Body;
 use super::header::{Frames, checked_frames};
 use super::limits::{MapFileError, MapFileLimits, Memory};
-use super::whole_map::Snapshot;
+use super::snapshot::Snapshot;
 use crate::codec::Unreadable;
 use crate::compression::{WINDOW_BYTES, decompress};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder;
 use crate::viewpoint_parts::{self, PartUse, uses_in};
-use crate::{FileSystem, StoreError, folder};
 use mrol_map::util::StopSignal;
 
 impl Snapshot {

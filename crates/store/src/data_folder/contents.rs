@@ -3,10 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::DataDir;
+use super::data_dir::DataDir;
 use crate::entry::Entry;
+use crate::error::StoreError;
+use crate::progress::OpeningProgress;
 use crate::replacement::{self, Replacement};
-use crate::{OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
+use crate::snapshots::Snapshot;
+use crate::{folder, map_files};
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
@@ -82,7 +85,7 @@ impl DataDir {
     /// is opened.
     pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) {
         for name in names {
-            let bytes = self.path(name).and_then(|path| snapshot_files::bytes_to_read(&*self.files, &path));
+            let bytes = self.path(name).and_then(|path| map_files::bytes_to_read(&*self.files, &path));
             progress.expect_map(bytes.unwrap_or_default());
         }
     }
@@ -107,7 +110,7 @@ impl DataDir {
     fn holds_only(&self, entry: &str, revision: u64) -> Result<bool, StoreError> {
         let path = self.maps.join(entry);
         let names = self.files.list(&path).map_err(StoreError::io(&path))?;
-        Ok(names == [snapshot_files::snapshot_name(revision)])
+        Ok(names == [map_files::snapshot_name(revision)])
     }
 
     /// Turns a map file into a map's folder.

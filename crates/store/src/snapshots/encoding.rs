@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use super::header::{begun, set_checksum};
-use super::whole_map::Snapshot;
+use super::snapshot::Snapshot;
 use super::writing::body_of;
 use crate::compression::compress_onto;
-use crate::{FileSystem, StoreError, folder};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder;
 use mrol_map::util::StopSignal;
 use mrol_map::visibility::ViewpointSet;
 

@@ -1,26 +1,4 @@
-//! The data folder, where a server keeps its maps.
-//!
-//! ```text
-//! DATA_DIR/lock                   held by the one process that uses the folder
-//! DATA_DIR/maps/NAME.UUID/        a map, see `map_folder.rs`
-//! DATA_DIR/maps/NAME/             a map of a former release: gets its uuid when it is opened
-//! DATA_DIR/maps/NAME.UUID.damaged/   a map whose files are damaged, set aside by `mrol doctor`: read by nobody
-//! DATA_DIR/maps/NAME.mrol         a map file (of version 1, a backup, of `mrol map --out`): taken in at a start where
-//!                                 there is no map of the name; where there is one, it stays and is reported
-//! DATA_DIR/maps/.unfinished-...   what a crash left: swept away
-//! ```
-//!
-//! The folder *is* the catalog. A map's name and uuid are its folder's; its settings are in each of its snapshots. That
-//! a map is made or deleted is one rename of its folder, which is atomic, so there is no second store that could
-//! disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions were
-//! accepted is part of the changes themselves, durable in the same record.
-//!
-//! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted goes
-//! into its own folder, and never into that of the next map of its name.
-
-mod contents;
-
-pub use contents::DataDirContents;
+//! The data folder in use: its maps are opened, created, replaced and removed.
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
@@ -29,12 +7,16 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::checked_files::CheckedFiles;
-use super::entry::Entry;
-use super::map_folder::{MapFolder, OpenedMap};
-use super::replacement::{self, REPLACES, Replacement};
-use super::snapshot_files::newest_good;
-use super::{Disk, FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, snapshot_files};
+use crate::checked_files::CheckedFiles;
+use crate::entry::Entry;
+use crate::error::StoreError;
+use crate::file_system::{Disk, FileSystem};
+use crate::folder;
+use crate::map_files::{self, MapFolder, OpenedMap, newest_good};
+use crate::progress::OpeningProgress;
+use crate::replacement::{self, REPLACES, Replacement};
+use crate::settings::StoreSettings;
+use crate::snapshots::Snapshot;
 use mrol_map::map::MapName;
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::util::StopSignal;
@@ -45,8 +27,8 @@ const LOCK_FILE: &str = "lock";
 /// The data folder, where a server keeps its maps. One process may hold it at a time.
 #[derive(Debug)]
 pub struct DataDir {
-    files: Arc<dyn FileSystem>,
-    maps: PathBuf,
+    pub(crate) files: Arc<dyn FileSystem>,
+    pub(crate) maps: PathBuf,
     settings: StoreSettings,
     /// Names of folders of maps that were deleted or never completed, which may still be there because removing them
     /// failed.
@@ -154,7 +136,7 @@ impl DataDir {
     ///
     /// # Errors
     /// When the system refuses. Where the new map is there already, the next start completes the exchange.
-    pub(super) fn replace_damaged(
+    pub(crate) fn replace_damaged(
         &self,
         name: &MapName,
         old: &Path,
@@ -188,7 +170,7 @@ impl DataDir {
     }
 
     /// Creates a map's folder with its first snapshot, as a whole or not at all.
-    fn make(
+    pub(crate) fn make(
         &self,
         entry: &str,
         first: &Snapshot,
@@ -202,7 +184,7 @@ impl DataDir {
             if let Some(replaces) = replaces {
                 folder::replace(&*self.files, &aside.join(REPLACES), &replaces.encode())?;
             }
-            let snapshot = snapshot_files::snapshot_name(first.contents.revision);
+            let snapshot = map_files::snapshot_name(first.contents.revision);
             first.write_until(&*self.files, &aside.join(snapshot), stop)?;
             let renamed = self.files.rename(&aside, &path).and_then(|()| self.files.sync(&self.maps));
             renamed.map_err(StoreError::io(&path))
@@ -244,13 +226,13 @@ impl DataDir {
         Ok(())
     }
 
-    fn entries(&self) -> Result<Vec<String>, StoreError> {
+    pub(crate) fn entries(&self) -> Result<Vec<String>, StoreError> {
         self.files.list(&self.maps).map_err(StoreError::io(&self.maps))
     }
 
     /// Names of the folders that claim to be that map. Leftovers of failed operations do not count: they are removed
     /// before the next map is created.
-    fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
+    pub(crate) fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
         let mut entries = self.entries()?;
         let leftovers = self.leftovers.lock();
         entries
@@ -262,7 +244,7 @@ impl DataDir {
     ///
     /// # Errors
     /// Where there is none, or more than one.
-    pub(super) fn path(&self, name: &MapName) -> Result<PathBuf, StoreError> {
+    pub(crate) fn path(&self, name: &MapName) -> Result<PathBuf, StoreError> {
         match &self.folders_of(name)?[..] {
             [] => Err(StoreError::NoFolder(name.clone())),
             [one] => Ok(self.maps.join(one)),
@@ -279,7 +261,7 @@ impl DataDir {
         if let Entry::Map { uuid, .. } = Entry::of_path(&path) {
             return Ok((path, uuid));
         }
-        let mut revisions = snapshot_files::snapshot_revisions(&*self.files, &path)?;
+        let mut revisions = map_files::snapshot_revisions(&*self.files, &path)?;
         let newest = newest_good(&*self.files, &path, &mut revisions, progress)?;
         let uuid = newest.snapshot.uuid;
         let adopted = self.maps.join(Entry::folder_name(name, uuid));
@@ -288,7 +270,7 @@ impl DataDir {
         Ok((adopted, uuid))
     }
 
-    pub(super) fn files(&self) -> &Arc<dyn FileSystem> {
+    pub(crate) fn files(&self) -> &Arc<dyn FileSystem> {
         &self.files
     }
 }

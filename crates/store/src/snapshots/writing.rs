@@ -5,7 +5,7 @@ use prost::Message;
 use prost::encoding::{WireType, encode_key, encode_varint, encoded_len_varint, key_len};
 
 use super::body::number;
-use super::whole_map::Snapshot;
+use super::snapshot::Snapshot;
 use crate::codec::{moments, voxels};
 use crate::pb;
 use mrol_map::map::MapContents;

@@ -6,19 +6,22 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::folder::{UNFINISHED, read_until};
-use super::journal::{SEGMENT_HEADER_BYTES, first_revision, owner_of_segment};
-use super::replacement::REPLACES;
-use super::viewpoint_parts::{
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder::{UNFINISHED, read_until};
+use crate::journal::{SEGMENT_HEADER_BYTES, first_revision, owner_of_segment};
+use crate::progress::OpeningProgress;
+use crate::replacement::REPLACES;
+use crate::snapshots::{self, Snapshot};
+use crate::viewpoint_parts::{
     self, LoadedParts, PART_HEADER_BYTES, owner_of_part, part_names, part_number, uses_in,
 };
-use super::{FileSystem, OpeningProgress, Snapshot, StoreError, snapshot};
 use mrol_map::map::REVISION_MAX;
 use mrol_map::util::StopSignal;
 
 /// Bytes that opening the map in `folder` will read: its newest snapshot, the parts of its viewpoints, and the journal from there
 /// on.
-pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
+pub(crate) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
     let names = files.list(folder).map_err(StoreError::io(folder))?;
     let newest = names.iter().filter_map(|name| snapshot_revision(name)).max().unwrap_or_default();
     let segments: Vec<&String> = names.iter().filter(|name| first_revision(name).is_some()).collect();
@@ -31,7 +34,7 @@ pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64
     needed.map(|name| files.size(&folder.join(name)).map_err(StoreError::io(folder.join(name)))).sum()
 }
 
-pub(super) fn snapshot_name(revision: u64) -> String {
+pub(crate) fn snapshot_name(revision: u64) -> String {
     format!("snapshot-{revision:020}.mrol")
 }
 
@@ -44,7 +47,7 @@ fn snapshot_revision(name: &str) -> Option<u64> {
 }
 
 /// Revisions of the snapshots in `folder`, ascending.
-pub(super) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Result<Vec<u64>, StoreError> {
+pub(crate) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Result<Vec<u64>, StoreError> {
     let names = files.list(folder).map_err(StoreError::io(folder))?;
     Ok(names.iter().filter_map(|name| snapshot_revision(name)).collect())
 }
@@ -52,8 +55,8 @@ pub(super) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Resul
 pub(super) type Damaged = (u64, StoreError);
 
 /// The newest readable snapshot of a folder, with its viewpoints.
-pub(super) struct Newest {
-    pub(super) snapshot: Snapshot,
+pub(crate) struct Newest {
+    pub(crate) snapshot: Snapshot,
     /// Head of the journal when it was written, or later.
     pub(super) head: u64,
     /// The parts that its viewpoints lie in, without these.
@@ -63,7 +66,7 @@ pub(super) struct Newest {
 }
 
 /// Finds the newest readable snapshot, and the newer ones that are not, which are removed from `revisions`.
-pub(super) fn newest_good(
+pub(crate) fn newest_good(
     files: &dyn FileSystem,
     folder: &Path,
     revisions: &mut Vec<u64>,
@@ -77,7 +80,7 @@ pub(super) fn newest_good(
         progress.read(bytes.len() as u64);
         match Snapshot::decode_own(&bytes, stop)? {
             Ok((mut snapshot, uses)) if snapshot.contents.revision == revision => {
-                let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
+                let head = snapshots::head_of(&bytes).unwrap_or_default().max(revision);
                 match viewpoint_parts::load(files, folder, snapshot.uuid, &uses, stop) {
                     Err(error @ StoreError::Damaged { .. }) => damaged.push((revision, error)),
                     Err(error) => return Err(error),
@@ -142,8 +145,8 @@ fn owner_of_snapshot(
     expected: Uuid,
     progress: &OpeningProgress,
 ) -> Result<Option<Uuid>, StoreError> {
-    let header = files.read_start(path, snapshot::HEADER_BYTES).map_err(StoreError::io(path))?;
-    if snapshot::uuid_in(&header) == Some(expected) {
+    let header = files.read_start(path, snapshots::HEADER_BYTES).map_err(StoreError::io(path))?;
+    if snapshots::uuid_in(&header) == Some(expected) {
         return Ok(Some(expected));
     }
     let is_cancelled = || progress.is_cancelled();
@@ -153,7 +156,7 @@ fn owner_of_snapshot(
 }
 
 /// Names in `folder` that are neither snapshots, segments nor parts of the viewpoints, nor set aside.
-pub(super) fn not_understood(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
+pub(crate) fn not_understood(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
     let mut names = files.list(folder).map_err(StoreError::io(folder))?;
     names.retain(|name| {
         let is_ours = name.ends_with(SET_ASIDE) || name.starts_with(UNFINISHED) || name == REPLACES;
@@ -202,8 +205,8 @@ pub(super) fn unneeded_parts(
     for revision in snapshot_revisions(files, folder)? {
         let path = folder.join(snapshot_name(revision));
         let start = |bytes| files.read_start(&path, bytes).map_err(StoreError::io(&path));
-        let Some(bytes) = snapshot::bytes_with_parts(&start(snapshot::HEADER_BYTES)?) else { continue };
-        match snapshot::parts_in_start(&start(bytes)?).map(uses_in) {
+        let Some(bytes) = snapshots::bytes_with_parts(&start(snapshots::HEADER_BYTES)?) else { continue };
+        match snapshots::parts_in_start(&start(bytes)?).map(uses_in) {
             Some(Ok(uses)) => there.retain(|number| uses.iter().all(|used| used.number != *number)),
             Some(Err(_)) | None => return Ok(Vec::new()),
         }
@@ -238,7 +241,7 @@ pub(super) fn forget_damaged(files: &dyn FileSystem, folder: &Path, revision: u6
 }
 
 /// Names of the files in `folder` that were set aside.
-pub(super) fn set_aside_in(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
+pub(crate) fn set_aside_in(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
     let mut names = files.list(folder).map_err(StoreError::io(folder))?;
     names.retain(|name| name.ends_with(SET_ASIDE));
     Ok(names)

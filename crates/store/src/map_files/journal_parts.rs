@@ -1,7 +1,8 @@
 //! Reads the journal backwards, a segment at a time.
 
-use super::MapFolder;
-use crate::{StoreError, StoredRecords};
+use super::map_folder::MapFolder;
+use crate::error::StoreError;
+use crate::journal::StoredRecords;
 
 /// Consecutive changes of the journal that lie in one segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

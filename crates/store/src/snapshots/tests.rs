@@ -11,10 +11,10 @@ use super::header::{
     FORMAT_VERSION, HEADER_BYTES, VERSION, bytes_with_parts, complete, head_of, parts_in_start, uuid_in,
 };
 use super::limits::{MapFileError, MapFileLimits, Memory};
-use super::whole_map::Snapshot;
+use super::snapshot::Snapshot;
 use super::writing::body_of;
-use crate::StoreError;
 use crate::codec::moments;
+use crate::error::StoreError;
 use crate::pb;
 use crate::viewpoint_parts::{PartUse, section_of, uses_in};
 use mrol_map::geometry::{self, Point};

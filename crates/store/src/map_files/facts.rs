@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::StoreSettings;
+use super::retention::{self, UndoWindow};
+use super::snapshot_files::Sizes;
 use crate::journal::{Journal, JournalUse, SegmentedJournal};
-use crate::retention::{self, UndoWindow};
-use crate::snapshot_files::Sizes;
+use crate::settings::StoreSettings;
 use mrol_map::map::WithdrawnChange;
 use mrol_map::sync::{Mutex, MutexGuard, Rank};
 
@@ -35,7 +35,7 @@ pub struct FolderUse {
 
 /// Shared facts about a folder. Writers update them after each step; a clone is another handle to the same facts.
 #[derive(Debug, Clone)]
-pub(super) struct Facts(Arc<Mutex<Known>>);
+pub(crate) struct Facts(Arc<Mutex<Known>>);
 
 #[derive(Debug)]
 struct Known {

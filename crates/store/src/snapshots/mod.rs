@@ -18,6 +18,9 @@
 //! ```
 //!
 //! The list of parts stands before the body, so that who asks which parts are needed reads only the start of the file.
+//!
+//! `snapshot` is the map, `encoding` and `decoding` make bytes of it and it of bytes; `header`, `body` (which is read) and
+//! `writing` (by which a body is written) are parts of the file.
 
 mod body;
 mod decoding;
@@ -25,13 +28,13 @@ mod encoding;
 mod fields;
 mod header;
 mod limits;
+mod snapshot;
 #[cfg(test)]
 mod tests;
 mod viewpoints;
-mod whole_map;
 mod writing;
 
 pub use header::{FORMAT_VERSION, body_bytes};
-pub(super) use header::{HEADER_BYTES, bytes_with_parts, complete, head_of, parts_in_start, uuid_in};
+pub(crate) use header::{HEADER_BYTES, bytes_with_parts, complete, head_of, parts_in_start, uuid_in};
 pub use limits::{MapFileError, MapFileLimits};
-pub use whole_map::Snapshot;
+pub use snapshot::Snapshot;

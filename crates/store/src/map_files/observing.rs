@@ -1,9 +1,12 @@
 //! Reads from a map's folder what the map would hold without some changes, for undo.
 
-use super::MapFolder;
 use super::facts::Pin;
-use crate::snapshot_files::snapshot_name;
-use crate::{Changes, MapFileError, MapFileLimits, Snapshot, StoreError, folder};
+use super::map_folder::MapFolder;
+use super::snapshot_files::snapshot_name;
+use crate::error::StoreError;
+use crate::folder;
+use crate::journal::Changes;
+use crate::snapshots::{MapFileError, MapFileLimits, Snapshot};
 use mrol_map::map::{Change, MapSettings, VoxelOwnership, WithdrawnChange};
 use mrol_map::util::StopSignal;
 

@@ -5,13 +5,18 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::{FolderPath, Found, MapFolder};
-use crate::journal::{Known, Recovered, SegmentedJournal};
-use crate::snapshot_files::{
+use super::map_folder::{Found, MapFolder};
+use super::snapshot_files::{
     Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
 };
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
+use crate::folder::{self, FolderPath};
+use crate::journal::{Known, Recovered, SegmentedJournal};
+use crate::progress::OpeningProgress;
+use crate::settings::StoreSettings;
+use crate::snapshots::Snapshot;
 use crate::viewpoint_parts::{self, ViewpointParts};
-use crate::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
 use mrol_map::map::{Change, KEEP_OUTS_MAX, KeepOutRecord, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 
