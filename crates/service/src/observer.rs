@@ -3,7 +3,8 @@
 use std::fmt::Debug;
 use std::time::Duration;
 
-use super::{DeletionAnswer, KeepOutAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
+use super::error::ServiceError;
+use super::request::{DeletionAnswer, KeepOutAnswer, MapVersion, UndoAnswer};
 use mrol_map::align::Verdict;
 use mrol_map::map::{CallerName, Lookup, MapName, RobotName};
 use mrol_map::mapping::Recovered;
@@ -127,46 +128,5 @@ impl Change {
     /// A map was made, deleted or replaced.
     pub(super) fn of_map(before: Option<MapVersion>, after: Option<MapVersion>) -> Self {
         Self { before, after, replayed: before == after, ..Self::default() }
-    }
-}
-
-impl MapService {
-    /// Does `work`, and tells the observers how the operation ended, with what `outcome` makes of the answer. They are
-    /// told where the caller goes away as well.
-    pub(super) async fn observed<A>(
-        &self,
-        operation: &'static str,
-        map: Option<&MapName>,
-        work: impl Future<Output = Result<A, ServiceError>>,
-        outcome: impl FnOnce(&A) -> Outcome,
-    ) -> Result<A, ServiceError> {
-        let pending = Pending { service: self, operation, map };
-        let answer = work.await;
-        std::mem::forget(pending);
-        let end = match &answer {
-            Ok(answer) => End::Done(outcome(answer)),
-            Err(error) => End::Failed(error),
-        };
-        self.tell(&Ended { operation, caller: self.caller.as_ref(), map, end });
-        answer
-    }
-
-    fn tell(&self, ended: &Ended<'_>) {
-        self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
-    }
-}
-
-/// An operation that is not over: dropped, its caller has gone.
-struct Pending<'a> {
-    service: &'a MapService,
-    operation: &'static str,
-    map: Option<&'a MapName>,
-}
-
-impl Drop for Pending<'_> {
-    fn drop(&mut self) {
-        let Self { service, operation, map } = *self;
-        let caller = service.caller.as_ref();
-        service.tell(&Ended { operation, caller, map, end: End::CallerGone });
     }
 }

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::{Gauges, Limits, Observer, ScanRequest};
+use super::limits::Limits;
+use super::observer::Observer;
+use super::request::ScanRequest;
+use super::resources::Gauges;
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::RobotName;
@@ -12,7 +15,7 @@ use mrol_map::mapping::{CarvingSettings, StationarySettings};
 use mrol_map::scan::PointFilter;
 use mrol_store::StoreSettings;
 
-/// Settings of a [`super::MapService`].
+/// Settings of a [`MapService`](crate::MapService).
 #[derive(Debug, Clone, Default)]
 pub struct ServiceSettings {
     /// Where maps are kept across restarts; nowhere without.

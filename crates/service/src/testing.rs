@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::MapService;
-use crate::commit_queue::{Decided, Submission};
+use super::commit::{Decided, Submission};
+use super::map_service::MapService;
 use mrol_map::map::{Change, MapName, MultiResolutionMap};
 
 impl MapService {

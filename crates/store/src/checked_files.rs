@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Appending, FileSystem};
+use super::file_system::{Appending, FileSystem};
 use mrol_map::sync::before_file_operation;
 use mrol_map::util::StopSignal;
 

@@ -5,7 +5,7 @@ use std::fs::{self, DirBuilder, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use super::StoreMode;
+use super::mode::StoreMode;
 use mrol_map::util::StopSignal;
 
 /// Bytes that are read between two checks of the stop signal: some ten milliseconds of a slow disk.

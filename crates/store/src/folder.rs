@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{FileSystem, StoreError};
+use super::error::StoreError;
+use super::file_system::FileSystem;
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::util::StopSignal;
 

@@ -15,39 +15,36 @@
 //! * When the journal cannot be written or synced, the map accepts no more changes, and can still be read. A sync is
 //!   not repeated after it failed.
 //!
-//! Byte layouts: `snapshot.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
+//! Byte layouts: `snapshots/mod.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
 
 mod checked_files;
 mod codec;
 mod compression;
-mod data_dir;
+mod data_folder;
 pub mod doctor;
 mod entry;
 mod error;
 mod file_system;
 mod folder;
 mod journal;
-mod map_folder;
+mod map_files;
 mod mode;
 mod pb;
 mod progress;
 mod replacement;
-mod retention;
 mod settings;
-mod snapshot;
-mod snapshot_files;
+mod snapshots;
 mod viewpoint_parts;
 
-pub use data_dir::{DataDir, DataDirContents};
+pub use data_folder::{DataDir, DataDirContents};
 pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{
     Changes, Cut, JOURNAL_VERSION, Journal, JournalUse, RECORD_BYTES_MAX, Record, Recovered, Revised,
     SegmentedJournal, StoredRecord, StoredRecords, VoxelMention,
 };
-pub use map_folder::{FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin};
+pub use map_files::{FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin};
 pub use mode::{StoreMode, StoreModeError};
 pub use progress::{Opened, OpeningProgress};
 pub use settings::{Durability, DurabilityError, StoreSettings};
-pub use snapshot::body_bytes;
-pub use snapshot::{FORMAT_VERSION, MapFileError, MapFileLimits, Snapshot};
+pub use snapshots::{FORMAT_VERSION, MapFileError, MapFileLimits, Snapshot, body_bytes};

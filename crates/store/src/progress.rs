@@ -1,8 +1,9 @@
 //! Progress of opening the maps.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
-use super::StoreError;
+use super::error::StoreError;
 
 /// Shared counters of the progress of opening maps; the readiness probe reads them.
 #[derive(Debug, Default)]

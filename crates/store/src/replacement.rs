@@ -15,7 +15,9 @@
 use std::path::Path;
 
 use super::entry::Entry;
-use super::{FileSystem, StoreError, folder};
+use super::error::StoreError;
+use super::file_system::FileSystem;
+use super::folder;
 
 /// Name of the file in the new map's folder.
 pub(super) const REPLACES: &str = "replaces";

@@ -4,7 +4,7 @@ use std::fmt::{self, Display};
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::StoreMode;
+use super::mode::StoreMode;
 use mrol_map::map::TrajectorySpacing;
 
 /// When a change may be acknowledged.

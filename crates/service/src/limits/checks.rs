@@ -1,7 +1,7 @@
 //! What is refused for its size, with the limit that says so.
 
-use super::Limits;
-use crate::{Reason, ServiceError};
+use super::service_limits::Limits;
+use crate::error::{Reason, ServiceError};
 
 /// Bytes of a message besides those of a block, at most.
 const BESIDE_BLOCK_BYTES: usize = 1 << 10;

@@ -1,6 +1,7 @@
 //! What checks of bodies have in common: how they are answered, and what is in the answer.
 
-use crate::{Limits, Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
 use mrol_map::planning::{Clearance, Hit, PlanningError, PlanningView, clearance_max_m};
 
 /// How a check is answered.

@@ -1,7 +1,12 @@
 //! Points as what is known of them: occupied, free, or unknown.
 
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
-use crate::{Limits, PointCloud, Reason, ServiceError};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
+use crate::request::PointCloud;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{OutOfRange, PointStates, classify_points};
 use mrol_map::util::StopSignal;

@@ -1,7 +1,11 @@
 //! Frontiers: where free space ends and nothing is known beyond.
 
-use super::{Asked, KnownPart, Question, QuestionedMap};
-use crate::{Limits, Reason, ServiceError};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::Question;
+use super::questioned_map::QuestionedMap;
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, Frontiers, STANDOFF_VOXELS,

@@ -1,7 +1,11 @@
 //! The map from above, as a 2-D grid.
 
-use super::{Asked, KnownPart, Question, QuestionedMap};
-use crate::{Limits, Reason, ServiceError};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::Question;
+use super::questioned_map::QuestionedMap;
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
 use mrol_map::util::StopSignal;

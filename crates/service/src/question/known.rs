@@ -1,6 +1,6 @@
 //! What of a map is known to who copies a region of it, and whether that is enough for an answer.
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::map::Region;
 use mrol_map::voxel::Lattice;
 

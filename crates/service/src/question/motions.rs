@@ -2,9 +2,14 @@
 
 use std::sync::Arc;
 
+use super::asked::Asked;
 use super::check::check_ignored;
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
-use crate::{Limits, ServiceError, check_not_stopped};
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
+use crate::error::ServiceError;
+use crate::limits::Limits;
+use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
     Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings, prepared_bytes,
@@ -86,7 +91,7 @@ impl Question for MotionCheck {
         let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
         let answers = view.check_motions(&question, stop)?;
         check_not_stopped(stop)?;
-        answers.map(|answers| (answers, view.version())).ok_or_else(|| super::ended_early(stop))
+        answers.map(|answers| (answers, view.version())).ok_or_else(|| ended_early(stop))
     }
 
     fn check_known(&self, answer: &Vec<MotionAnswer>, known: &KnownPart) -> Result<(), ServiceError> {

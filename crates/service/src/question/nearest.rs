@@ -1,7 +1,12 @@
 //! The nearest voxel of points.
 
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
-use crate::{Limits, PointCloud, Reason, ServiceError};
+use super::asked::Asked;
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
+use crate::error::{Reason, ServiceError};
+use crate::limits::Limits;
+use crate::request::PointCloud;
 use mrol_map::geometry::Point;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, find_nearest};

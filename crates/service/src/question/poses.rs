@@ -2,9 +2,14 @@
 
 use std::sync::Arc;
 
+use super::asked::Asked;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
-use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
-use crate::{Limits, ServiceError, check_not_stopped};
+use super::known::KnownPart;
+use super::planner_question::{Question, check_elements};
+use super::questioned_map::QuestionedMap;
+use crate::error::ServiceError;
+use crate::limits::Limits;
+use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{Body, Configurations, NUMBERS_PER_POSE, PoseQuestion, Surroundings};
 use mrol_map::util::StopSignal;
@@ -73,7 +78,7 @@ impl Question for PoseCheck {
             }
         };
         check_not_stopped(stop)?;
-        collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| super::ended_early(stop))
+        collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| ended_early(stop))
     }
 
     fn check_known(&self, answer: &Collisions, known: &KnownPart) -> Result<(), ServiceError> {

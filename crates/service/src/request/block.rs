@@ -1,7 +1,7 @@
 //! Blocks of a map, for planners that look into it themselves.
 
 use super::version::MapVersion;
-use crate::BlockBytes;
+use super::watch::BlockBytes;
 use mrol_map::map::{DistanceBlock, Region};
 
 /// What does a part of the map hold?

@@ -2,7 +2,7 @@
 
 use super::point_cloud::PointCloud;
 use super::version::MapVersion;
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::map::{Region, RequestId};
 use mrol_map::voxel::VoxelKey;
 

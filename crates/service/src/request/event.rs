@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::scan::ScanAnswer;
-use crate::ServiceError;
+use crate::error::ServiceError;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{RobotName, SessionName};
 

@@ -1,5 +1,6 @@
 //! Requests and answers of the service, in domain types; a file for each kind of operation.
 
+mod bitmap;
 mod block;
 mod deletion;
 mod event;
@@ -10,9 +11,11 @@ mod occupancy;
 mod point_cloud;
 mod point_times;
 mod scan;
+mod scan_name;
 mod trajectory;
 mod undo;
 mod version;
+mod voxel_checks;
 mod watch;
 
 pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
@@ -32,3 +35,7 @@ pub use watch::{
     BlockBytes, Cause, ChangePart, LeftViewpoint, StatePart, WatchEvent, WatchForm, WatchMessage,
     WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
 };
+
+pub(crate) use bitmap::bitmap;
+pub(crate) use scan_name::{scan_id_too_old, scan_name};
+pub(crate) use voxel_checks::{key_in_range, point_without_voxel, without_voxel};

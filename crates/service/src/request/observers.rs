@@ -1,7 +1,7 @@
 //! The scans that touched a voxel.
 
 use super::version::MapVersion;
-use crate::WatchedScan;
+use super::watch::WatchedScan;
 use mrol_map::geometry::Point;
 use mrol_map::voxel::VoxelKey;
 

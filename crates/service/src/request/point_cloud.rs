@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::geometry::Point;
 
 /// Points as they came from the wire: 12 bytes each, shared, never copied.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 
 /// When the points of a scan were measured, seconds from the scan's timestamp, one for each.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::{Reason, ServiceError};
+use crate::error::{Reason, ServiceError};
 use mrol_map::geometry::Pose;
 use mrol_map::map::{
     ContentHash, ContentVersion, KeepOut, KeepOutChange, MappedScan, Region, RobotName, SessionName,

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::full_state::FullState;
-use crate::hosted_map::HostedMap;
-use crate::resource_budget::ResourceBudget;
-use crate::{BlockBytes, ServiceError, WatchForm, check_not_stopped};
+use crate::error::ServiceError;
+use crate::maps::{FullState, HostedMap};
+use crate::request::{BlockBytes, WatchForm};
+use crate::resources::ResourceBudget;
+use crate::work::check_not_stopped;
 use mrol_map::util::StopSignal;
 
 /// Whom memory is lent to, in refusals.
 const WATCH: &str = "a watch";
 /// Bytes of memory of a block.
-const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
+pub(crate) const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
 
 impl HostedMap {
     /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those who
@@ -26,8 +27,11 @@ impl HostedMap {
             WatchForm::Changes => (None, 0),
             WatchForm::Deltas { level } => (Some(level), level),
         };
-        if let Some(known) =
-            self.full_states.get(key).filter(|state| self.recent.can_follow(state.version.revision, form))
+        if let Some(known) = self
+            .followers
+            .whole_states
+            .get(key)
+            .filter(|state| self.followers.recent.can_follow(state.version.revision, form))
         {
             return Ok(known);
         }
@@ -43,14 +47,16 @@ impl HostedMap {
         drop(long_read);
         check_not_stopped(stop)?;
         let state = Arc::new(FullState { version, level, voxels, keep_outs, viewpoints });
-        self.full_states.put(key, &state);
+        self.followers.whole_states.put(key, &state);
         Ok(state)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::{MapService, ScanRequest, ServiceSettings, WatchEvent, WatchRequest};
+    use crate::map_service::MapService;
+    use crate::request::{ScanRequest, WatchEvent, WatchRequest};
+    use crate::settings::ServiceSettings;
     use mrol_map::geometry::{Point, Pose};
     use mrol_map::map::{MapName, MapSettings, Region, RobotName};
     use mrol_map::mapping::Guess;
@@ -83,7 +89,7 @@ mod tests {
             watches.push(watch);
         }
         let hosted = service.map(&map).unwrap();
-        let state = hosted.full_states.get(None).expect("it is being told");
+        let state = hosted.followers.whole_states.get(None).expect("it is being told");
         assert_eq!(std::sync::Arc::strong_count(&state), WATCHERS as usize + 1);
         drop(watches);
         assert_eq!(std::sync::Arc::strong_count(&state), 1);

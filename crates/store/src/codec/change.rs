@@ -1,6 +1,6 @@
 //! Encoding of changes, and of the requests that made them.
 
-use super::{Unreadable, count, required};
+use super::unreadable::{Unreadable, count, required};
 use crate::pb;
 use mrol_map::map::{
     CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, RequestKind, UndoRecord,

@@ -1,7 +1,7 @@
 //! Encoding of keep-outs and of their changes.
 
 use super::change::{caller_from, text_of};
-use super::{Unreadable, required};
+use super::unreadable::{Unreadable, required};
 use crate::pb;
 use mrol_map::geometry::{self, rotation_xyzw, translation_m};
 use mrol_map::map::{

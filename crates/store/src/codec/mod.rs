@@ -4,23 +4,13 @@
 
 mod change;
 mod keep_out;
-pub(super) mod moments;
+pub(crate) mod moments;
 mod scan;
+mod unreadable;
 mod viewpoint;
-pub(super) mod voxels;
+pub(crate) mod voxels;
 
-pub(super) use scan::with_forgotten;
-pub(super) use viewpoint::{ascending_from, gaps_of};
-
-/// Description of what is wrong with a message; meaningless once its reading was stopped.
-pub(super) type Unreadable = String;
-
-/// Returns the value of a required field.
-pub(super) fn required<T>(value: Option<T>, field: &str) -> Result<T, Unreadable> {
-    value.ok_or_else(|| format!("{field} is missing"))
-}
-
-/// Converts a count to `usize`; larger counts saturate.
-fn count(count: u64) -> usize {
-    usize::try_from(count).unwrap_or(usize::MAX)
-}
+pub(crate) use scan::with_forgotten;
+pub(crate) use unreadable::{Unreadable, required};
+pub(crate) use viewpoint::{ascending_from, gaps_of};
+pub(crate) use voxels::blocks_of;

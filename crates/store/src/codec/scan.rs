@@ -1,6 +1,7 @@
 //! Encoding of scans: their poses, and their voxels.
 
-use super::{Unreadable, count, moments, required};
+use super::moments;
+use super::unreadable::{Unreadable, count, required};
 use crate::pb;
 use mrol_map::geometry::{self, Pose, rotation_xyzw, translation_m};
 use mrol_map::map::{

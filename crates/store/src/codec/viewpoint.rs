@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::Unreadable;
 use super::scan::{pose_from, pose_numbers};
+use super::unreadable::Unreadable;
 use crate::pb;
 use mrol_map::map::ViewpointRecord;
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Viewpoint};

@@ -1,6 +1,6 @@
 //! Encoding of voxel sets: gaps between block keys, and each block as an octree of three levels.
 
-use super::Unreadable;
+use super::unreadable::Unreadable;
 use crate::pb;
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey, VoxelSet};

@@ -1,11 +1,22 @@
 //! Tests of the check of folders.
 
-use super::*;
-use crate::{Record, StoreSettings};
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::diagnose::diagnose;
+use super::diagnosis::Diagnosis;
+use super::set_aside::{SetAside, set_aside};
+use crate::data_folder::DataDir;
+use crate::journal::Record;
+use crate::map_files;
+use crate::progress::OpeningProgress;
+use crate::settings::StoreSettings;
+use crate::snapshots::Snapshot;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{
-    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, Region,
-    RobotName, ScanRecord, ViewpointRecord,
+    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapName, MapSettings,
+    MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord, ViewpointRecord,
 };
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 use mrol_map::voxel::VoxelSet;
@@ -54,7 +65,7 @@ fn a_snapshot_whose_keep_outs_the_journal_does_not_make_is_told() {
     assert_eq!(diagnose(&data_dir, &name).unwrap().problems, Vec::<String>::new());
 
     snapshot.contents.keep_outs = Arc::default();
-    let file = folder.path().join(snapshot_files::snapshot_name(1));
+    let file = folder.path().join(map_files::snapshot_name(1));
     snapshot.write(&**data_dir.files(), &file).unwrap();
     let problems = diagnose(&data_dir, &name).unwrap().problems;
     assert_eq!(problems, ["the snapshot of revision 1 is not what the journal makes"]);
@@ -68,7 +79,7 @@ fn a_snapshot_that_a_kill_left_behind_the_beginning_of_the_journal_is_no_problem
     let (name, uuid) = (MapName::new("office").unwrap(), Uuid::from_u128(7));
     let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
     let folder = data_dir.create(&name, &Snapshot::of(&map, uuid)).unwrap();
-    let first = folder.path().join(snapshot_files::snapshot_name(0));
+    let first = folder.path().join(map_files::snapshot_name(0));
     let bytes = std::fs::read(&first).unwrap();
     for names in [["dock", "lift"], ["ramp", "hall"], ["door", "gate"]] {
         for name in names {

@@ -6,8 +6,9 @@ use uuid::Uuid;
 
 use super::segment::{Break, Frames};
 use super::segmented::SegmentFolder;
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
 use crate::folder::FolderPath;
-use crate::{FileSystem, StoreError};
 use mrol_map::map::Change;
 
 /// Contents of a segment.

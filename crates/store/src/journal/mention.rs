@@ -6,8 +6,7 @@
 use prost::Message;
 
 use super::record;
-use crate::codec::voxels::blocks_of;
-use crate::codec::{Unreadable, required};
+use crate::codec::{Unreadable, blocks_of, required};
 use crate::pb;
 use mrol_map::map::MappedScan;
 use mrol_map::voxel::{VoxelKey, VoxelSet};

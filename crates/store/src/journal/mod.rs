@@ -1,63 +1,25 @@
 //! The journal of a map: its changes in the order of their revisions, durable before they are visible.
 //!
 //! [`Journal`] is a narrow trait, so that a replicated log can take the place of [`SegmentedJournal`], which is files
-//! on this machine. Reading order: `record` is a change as bytes, `frame` a record in a file, `segment` a file,
-//! `segmented` all files, `recovery` reads them after a crash.
+//! on this machine. Reading order: `log` is the trait, `record` a change as bytes, `frame` a record in a file, `segment`
+//! a file, `segmented` all files, `recovery` reads them after a crash.
 
 mod frame;
 mod inspection;
+mod log;
 mod mention;
 mod record;
 mod recovery;
 mod segment;
 mod segmented;
 
-pub(super) use inspection::{Inspected, inspect};
+pub(crate) use inspection::{Inspected, inspect};
+pub use log::{Changes, Journal, Revised, StoredRecords};
 pub use mention::{StoredRecord, VoxelMention};
 pub use record::{RECORD_BYTES_MAX, Record};
-pub(super) use recovery::Known;
+pub(crate) use recovery::Known;
 pub use recovery::{Cut, Recovered};
 pub use segment::JOURNAL_VERSION;
-pub(super) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision, owner as owner_of_segment};
-pub(super) use segmented::SegmentFolder;
+pub(crate) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision, owner as owner_of_segment};
+pub(crate) use segmented::SegmentFolder;
 pub use segmented::{JournalUse, SegmentedJournal};
-
-use super::StoreError;
-use mrol_map::map::Change;
-
-/// A change with the revision that it made.
-pub type Revised = (u64, Change);
-/// Iterator of changes in the order of their revisions, read on demand.
-pub type Changes = Box<dyn Iterator<Item = Result<Revised, StoreError>> + Send>;
-
-/// Iterator of records in the order of their revisions, read on demand.
-pub type StoredRecords = Box<dyn Iterator<Item = Result<(u64, StoredRecord), StoreError>> + Send>;
-
-/// A log of changes. The sequence numbers are the map's revisions: 1, 2, 3, ...
-pub trait Journal: std::fmt::Debug + Send {
-    /// Appends records, which get the revisions after the head, and returns the new head. They are durable after the
-    /// next [`Journal::sync`], so that one sync serves all who wait for it.
-    ///
-    /// # Errors
-    /// When they cannot be written. The journal then accepts nothing more.
-    fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError>;
-
-    /// Makes everything appended so far durable.
-    ///
-    /// # Errors
-    /// When that is not certain. The journal then accepts nothing more and is not synced again: the system may have
-    /// dropped what it could not write.
-    fn sync(&mut self) -> Result<(), StoreError>;
-
-    /// Returns the last revision that was appended.
-    fn head(&self) -> u64;
-
-    /// Reads the changes from `revision` to the present head; a revision that was removed is an error.
-    fn read_from(&self, revision: u64) -> Changes;
-
-    /// Removes changes before `revision`, as far as that is cheap.
-    ///
-    /// # Errors
-    /// When the system refuses; nothing else is removed then.
-    fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError>;
-}

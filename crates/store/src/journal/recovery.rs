@@ -7,8 +7,10 @@ use uuid::Uuid;
 
 use super::segment::{self, Break, Frames};
 use super::segmented::{SegmentFolder, SegmentedJournal};
+use crate::error::StoreError;
+use crate::file_system::FileSystem;
 use crate::folder::FolderPath;
-use crate::{FileSystem, OpeningProgress, StoreError};
+use crate::progress::OpeningProgress;
 use mrol_map::map::Change;
 
 /// Result of reading the journal after a snapshot.
@@ -188,8 +190,10 @@ impl Segment<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::journal::Journal;
-    use crate::{Disk, Record, StoreSettings};
+    use crate::file_system::Disk;
+    use crate::journal::log::Journal;
+    use crate::journal::record::Record;
+    use crate::settings::StoreSettings;
     use mrol_map::geometry::Pose;
     use mrol_map::map::{MappedScan, RobotName, ScanRecord};
     use mrol_map::voxel::VoxelSet;

@@ -20,7 +20,7 @@ use std::path::Path;
 use uuid::Uuid;
 
 use super::frame::{self, Frame};
-use crate::StoreError;
+use crate::error::StoreError;
 use mrol_map::map::REVISION_MAX;
 
 /// Format version that this build writes; it reads this one and all earlier ones. In version 1 moments have no forms;

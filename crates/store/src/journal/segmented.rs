@@ -7,12 +7,15 @@ use std::time::Instant;
 
 use uuid::Uuid;
 
-use super::frame::Frame;
+use super::frame::{self, Frame};
+use super::log::{Changes, Journal, StoredRecords};
+use super::record::Record;
 use super::segment::{self, Frames};
-use super::{Changes, Journal, Record, StoredRecords, frame};
 use crate::codec::Unreadable;
+use crate::error::StoreError;
+use crate::file_system::{Appending, FileSystem};
 use crate::folder::{self, FolderPath};
-use crate::{Appending, FileSystem, OpeningProgress, StoreError};
+use crate::progress::OpeningProgress;
 use mrol_map::map::REVISION_MAX;
 use mrol_map::util::{Durations, StopSignal};
 

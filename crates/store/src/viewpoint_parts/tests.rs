@@ -4,11 +4,19 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uuid::Uuid;
 
-use super::*;
-use crate::Disk;
+use super::file::{ViewpointPart, part_names};
+use super::known_part::KnownPart;
+use super::loading::{LoadedParts, load};
+use super::plan::ViewpointParts;
+use super::uses::{PartUse, section_of, uses_in};
+use crate::error::StoreError;
+use crate::file_system::Disk;
+use crate::folder;
 use mrol_map::geometry::{Point, Pose};
-use mrol_map::visibility::{RangeImage, Sweep, Viewpoint};
+use mrol_map::util::StopSignal;
+use mrol_map::visibility::{RangeImage, Sweep, Viewpoint, ViewpointSet};
 
 const MAP: Uuid = Uuid::from_u128(7);
 

@@ -1,6 +1,6 @@
 //! Encoding of moments of one or two points as the points themselves.
 
-use super::Numbers;
+use super::steps::Numbers;
 use mrol_map::voxel::Moments;
 
 /// Up to [`FewPoints::MOST`] points, each as three signed bytes: its offset from the voxel's center in steps.

@@ -1,12 +1,14 @@
 //! Encoding of moments without their keys, each in the shortest form that holds all of it.
 
 use super::few_points::FewPoints;
-use super::{Numbers, VOXELS_PER_LOOK, steps};
-use crate::codec::Unreadable;
+use super::steps::{self, Numbers};
+use crate::codec::unreadable::Unreadable;
 use crate::pb;
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::{MomentSet, Moments};
 
+/// Voxels whose moments are written or read between two checks of the stop signal: some milliseconds.
+pub(super) const VOXELS_PER_LOOK: usize = 16 << 10;
 /// Form of ten numbers in steps. Smaller forms are numbers of points.
 const STEPS: u8 = FewPoints::MOST + 1;
 /// Form of ten numbers in units.

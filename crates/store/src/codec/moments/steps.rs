@@ -1,7 +1,9 @@
 //! Conversion of moments from units to steps: a voxel is 256 steps wide, so that an offset is a byte.
 
-use super::Numbers;
 use mrol_map::voxel::Moments;
+
+/// Moments as [`Moments::to_numbers`] returns them, in units or in steps.
+pub(super) type Numbers = [i64; Moments::NUMBERS];
 
 /// Units in a step. [`Moments::STEP`] should be a multiple of it, or nothing gets shorter.
 const STEP: i64 = Moments::UNITS / 256;

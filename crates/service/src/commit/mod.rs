@@ -1,0 +1,34 @@
+//! How changes become durable, then visible, then acknowledged.
+//!
+//! ```text
+//! many threads                one thread a map
+//!
+//! align, quantize, encode --> take all that wait
+//!                             append to the journal   they take their revisions here
+//!                             sync                    once for all of them
+//!                             apply                   in the order of revisions
+//!                             publish, acknowledge
+//! ```
+//!
+//! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
+//! before it is applied and nothing after it has begun.
+//!
+//! A [`Submission`] goes into the [`CommitQueue`] of its map; the `worker` takes it out, journals it, applies it and
+//! publishes it to [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn
+//! comes.
+
+mod commit_queue;
+mod recent_changes;
+mod scan_turn;
+mod stop;
+mod submission;
+mod watched_change;
+mod worker;
+
+pub(crate) use commit_queue::{CommitQueue, CommitThread};
+pub(crate) use recent_changes::{RecentChanges, WatchedLevel};
+pub(crate) use scan_turn::TurnLimits;
+pub(crate) use stop::Stop;
+pub(crate) use submission::{Decided, Prepared, Refusal, RobotLock, Step, Submission, record_of};
+pub(crate) use watched_change::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, has_looked_into};
+pub(crate) use worker::Published;

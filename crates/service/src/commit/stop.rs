@@ -1,0 +1,53 @@
+//! Why a map takes no more changes, and what its callers are told then.
+
+use crate::error::{Reason, ServiceError};
+use mrol_map::map::{MapName, REVISION_MAX};
+use mrol_store::StoreError;
+
+/// Why a map takes no more changes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// The map's journal could not be written: what the disk holds is unknown.
+    Failed(String),
+    /// The map was deleted.
+    Deleted,
+    /// Another has its name now.
+    Replaced,
+}
+
+impl Stop {
+    /// What to say to who wants to change the map.
+    pub(crate) fn refusal(&self, name: &MapName) -> ServiceError {
+        match self {
+            Self::Failed(reason) => {
+                let message = format!(
+                    "map {name} is read only since its journal failed ({reason}): restart the server when the disk \
+                     is well"
+                );
+                ServiceError::new(Reason::MapReadOnly, message)
+            }
+            Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
+            Self::Replaced => {
+                let message = format!("map {name} was replaced by another: ask for its map_uuid");
+                ServiceError::new(Reason::MapReplaced, message)
+            }
+        }
+    }
+}
+
+/// What to say to whose change was handed to a journal that failed then.
+pub(super) fn outcome_unknown(name: &MapName, error: &StoreError) -> ServiceError {
+    let message = format!(
+        "the journal of map {name} failed while this change was written ({error}): it may be there after the next \
+         restart of the server; the same scan_id or request_id, sent again then, tells"
+    );
+    ServiceError::new(Reason::OutcomeUnknown, message)
+}
+
+/// What to say where the map has no revision left.
+pub(super) fn revisions_used_up(name: &MapName) -> ServiceError {
+    let message = format!(
+        "map {name} is at revision {REVISION_MAX}, the last that there is: make another map, and insert there"
+    );
+    ServiceError::new(Reason::RevisionsUsedUp, message)
+}

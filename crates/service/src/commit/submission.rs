@@ -1,0 +1,95 @@
+//! A change on its way into a map: what is handed to the map's thread, and what becomes of it.
+
+use std::sync::Arc;
+
+use tokio::sync::{OwnedMutexGuard, oneshot};
+
+use super::scan_turn::TurnLimits;
+use crate::error::{Reason, ServiceError};
+use crate::resources::Reservation;
+use mrol_map::map::{Change, Committed, MultiResolutionMap};
+use mrol_map::util::StopSignal;
+use mrol_store::{Pin, Record};
+
+/// Keeps one robot's scans in order; held until its change is visible.
+pub(crate) type RobotLock = Arc<OwnedMutexGuard<()>>;
+/// Decides on a change when everything before it is applied; none where there is nothing to change. While it does, all
+/// other changes of the map wait: it gives up where nobody waits for the answer any more.
+pub(super) type Decision =
+    Box<dyn FnOnce(&MultiResolutionMap, StopSignal<'_>) -> Result<Option<Decided>, Refusal> + Send + 'static>;
+
+/// A change that was decided on in its turn.
+pub(crate) struct Decided {
+    pub(crate) change: Change,
+    /// Where it was made before.
+    pub(crate) record: Option<Record>,
+    /// The memory that it takes.
+    pub(crate) lent: Vec<Reservation>,
+    /// Keeps what it was made of until it is visible.
+    pub(crate) pin: Option<Pin>,
+}
+
+/// A change on its way into the map.
+pub(crate) enum Submission {
+    /// Known.
+    Prepared(Box<Prepared>),
+    /// To be decided on.
+    Undecided(Decision),
+}
+
+/// A change that is known before its turn comes.
+pub(crate) struct Prepared {
+    pub(crate) change: Change,
+    /// Where there is a journal.
+    pub(crate) record: Option<Record>,
+    /// True of a change that was decided on an empty map, and holds for no other.
+    pub(crate) if_empty: bool,
+    /// What a scan may still do when its turn comes.
+    pub(crate) limits: TurnLimits,
+    pub(crate) robot_lock: RobotLock,
+    /// The memory that it takes.
+    pub(crate) reservation: Reservation,
+}
+
+/// Why a change was not made.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// The map has changed since it was decided on: decide again.
+    Stale,
+    /// The change cannot be made.
+    Failed(ServiceError),
+}
+
+impl From<ServiceError> for Refusal {
+    fn from(error: ServiceError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+pub(super) type Outcome = Result<Committed, Refusal>;
+
+/// A request that is answered, or on its way into the map.
+pub(crate) enum Step<A> {
+    /// The request changes nothing, or was done before: its answer.
+    Answered(A),
+    /// What becomes of it will be known, and then what to say.
+    Submitted(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
+}
+
+/// A submission with the one who waits for it.
+pub(super) struct Waiting {
+    pub(super) submission: Submission,
+    pub(super) answer: oneshot::Sender<Outcome>,
+}
+
+/// Closures have no form to print.
+impl std::fmt::Debug for Waiting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Waiting")
+    }
+}
+
+/// The record of a change.
+pub(crate) fn record_of(change: &Change) -> Result<Record, ServiceError> {
+    Record::of(change).map_err(|reason| ServiceError::new(Reason::RecordTooLarge, reason))
+}

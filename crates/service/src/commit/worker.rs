@@ -1,0 +1,287 @@
+//! The thread of a map: durable, then visible, then acknowledged.
+
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use tokio::sync::{oneshot, watch};
+
+use super::recent_changes::RecentChanges;
+use super::scan_turn::{ScanTurn, TurnLimits};
+use super::stop::{Stop, outcome_unknown, revisions_used_up};
+use super::submission::{
+    Decided, Decision, Outcome, Prepared, Refusal, RobotLock, Submission, Waiting, record_of,
+};
+use super::watched_change::WatchedChange;
+use crate::error::ServiceError;
+use crate::resources::Reservation;
+use mrol_map::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
+use mrol_map::sync::mpsc::{Receiver, RecvTimeoutError};
+use mrol_map::util::{SharedDurations, StopSignal};
+use mrol_store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
+
+/// Changes that share one sync, and as many that wait meanwhile; one more is refused.
+pub(super) const GROUP_MAX: usize = 256;
+/// Revisions between two thinnings of the trajectory of a map in memory.
+const THINNED_EVERY: u64 = 4096;
+
+/// Where a map's thread publishes each change that it made.
+pub(crate) struct Published {
+    /// The last revision, for those who wait for one.
+    pub(crate) announced: watch::Sender<u64>,
+    /// The last changes, for those who watch the map.
+    pub(crate) recent: Arc<RecentChanges>,
+}
+
+/// What a map's thread works with.
+pub(super) struct Worker {
+    name: MapName,
+    map: Arc<MultiResolutionMap>,
+    folder: Option<Arc<MapFolder>>,
+    published: Published,
+    stopped: Arc<OnceLock<Stop>>,
+    durations: Arc<SharedDurations>,
+    settings: StoreSettings,
+    /// Since when something waits to be synced at an interval.
+    unsynced: Option<Instant>,
+    /// When the trajectory of a map in memory was thinned last.
+    thinned: u64,
+}
+
+/// A change to be made, with its record and the one who waits.
+struct Pending {
+    change: Change,
+    record: Option<Record>,
+    answer: oneshot::Sender<Outcome>,
+    /// Kept until the change is visible.
+    _robot_lock: Option<RobotLock>,
+    _memory: Vec<Reservation>,
+    _pin: Option<Pin>,
+}
+
+impl Worker {
+    pub(super) fn new(
+        name: MapName,
+        map: Arc<MultiResolutionMap>,
+        folder: Option<Arc<MapFolder>>,
+        published: Published,
+        stopped: Arc<OnceLock<Stop>>,
+        durations: Arc<SharedDurations>,
+        settings: &StoreSettings,
+    ) -> Self {
+        let thinned = map.revision();
+        let settings = settings.clone();
+        Self { name, map, folder, published, stopped, durations, settings, unsynced: None, thinned }
+    }
+
+    /// Makes changes until nobody can send one any more.
+    pub(super) fn run(mut self, inbox: &Receiver<Waiting>) {
+        loop {
+            match self.next(inbox) {
+                Ok(first) => {
+                    let rest = inbox.try_iter().take(GROUP_MAX - 1);
+                    let waiting: Vec<Waiting> = std::iter::once(first).chain(rest).collect();
+                    self.commit(waiting);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            self.sync_if_due();
+        }
+        self.sync();
+    }
+
+    fn next(&self, inbox: &Receiver<Waiting>) -> Result<Waiting, RecvTimeoutError> {
+        match self.until_sync() {
+            Some(rest) => inbox.recv_timeout(rest),
+            None => inbox.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        }
+    }
+
+    /// Makes the changes that wait, in order; a run of known ones shares one sync.
+    fn commit(&mut self, waiting: Vec<Waiting>) {
+        let mut group = Vec::new();
+        for Waiting { submission, answer } in waiting {
+            match submission {
+                Submission::Prepared(prepared) => {
+                    let Prepared { mut change, mut record, if_empty, limits, robot_lock, reservation } =
+                        *prepared;
+                    if if_empty {
+                        self.commit_group(&mut group);
+                        if !self.map.is_empty() {
+                            drop(answer.send(Err(Refusal::Stale)));
+                            continue;
+                        }
+                    }
+                    if let Err(error) = self.settle(&mut change, &mut record, limits, &group) {
+                        drop(answer.send(Err(Refusal::Failed(error))));
+                        continue;
+                    }
+                    let (_robot_lock, _memory) = (Some(robot_lock), vec![reservation]);
+                    group.push(Pending { change, record, answer, _robot_lock, _memory, _pin: None });
+                }
+                Submission::Undecided(decide) => {
+                    self.commit_group(&mut group);
+                    self.decide(decide, answer, &mut group);
+                    self.commit_group(&mut group);
+                }
+            }
+        }
+        self.commit_group(&mut group);
+    }
+
+    /// Cuts a scan to what it may still do now that its turn comes.
+    fn settle(
+        &self,
+        change: &mut Change,
+        record: &mut Option<Record>,
+        limits: TurnLimits,
+        group: &[Pending],
+    ) -> Result<(), ServiceError> {
+        let Change::Insertion(scan) = &mut *change else { return Ok(()) };
+        let before = group.iter().map(|pending| &pending.change).collect();
+        let turn = ScanTurn { map: &self.map, recent: &self.published.recent, before };
+        if turn.cut(scan, limits) && record.is_some() {
+            *record = Some(record_of(change)?);
+        }
+        Ok(())
+    }
+
+    fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
+        let unchanged = Committed::none(self.map.content_version());
+        let caller_gone = || answer.is_closed();
+        let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
+            Some(Decided { change, record, lent, pin }) => {
+                let record = match (record, &self.folder) {
+                    (None, Some(_)) => Some(record_of(&change)?),
+                    (record, _) => record,
+                };
+                Ok(Some((change, record, lent, pin)))
+            }
+            None => Ok(None),
+        };
+        match decided() {
+            Ok(Some((change, record, _memory, _pin))) => {
+                group.push(Pending { change, record, answer, _robot_lock: None, _memory, _pin });
+            }
+            Ok(None) => drop(answer.send(Ok(unchanged))),
+            Err(refusal) => drop(answer.send(Err(refusal))),
+        }
+    }
+
+    /// Durable, then visible, then acknowledged.
+    fn commit_group(&mut self, group: &mut Vec<Pending>) {
+        let left = usize::try_from(REVISION_MAX.saturating_sub(self.map.revision())).unwrap_or(usize::MAX);
+        for Pending { answer, .. } in group.drain(left.min(group.len())..) {
+            drop(answer.send(Err(Refusal::Failed(revisions_used_up(&self.name)))));
+        }
+        if group.is_empty() {
+            return;
+        }
+        let begin = Instant::now();
+        if let Err(error) = self.journal(group) {
+            for Pending { answer, .. } in group.drain(..) {
+                drop(answer.send(Err(Refusal::Failed(error.clone()))));
+            }
+            return;
+        }
+        for Pending { change, answer, .. } in group.drain(..) {
+            let Published { announced, recent } = &self.published;
+            let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
+            debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
+            announced.send_replace(committed.revision);
+            drop(answer.send(Ok(committed)));
+            recent.push(WatchedChange::of(committed.revision, Some(committed.hash), change, levels));
+        }
+        self.tell_durable();
+        self.durations.record(begin.elapsed());
+        self.thin_in_memory();
+    }
+
+    /// Tells who watches the map how far it is durable.
+    fn tell_durable(&self) {
+        let visible = self.map.revision();
+        let durable = self.folder.as_ref().map_or(visible, |folder| folder.used().durable.min(visible));
+        self.published.recent.tell_durable(durable);
+    }
+
+    /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would
+    /// reach; that of others is thinned when undo reaches less far.
+    fn thin_in_memory(&mut self) {
+        let revision = self.map.revision();
+        if self.folder.is_none() && revision - self.thinned >= THINNED_EVERY {
+            let before = revision.saturating_sub(self.settings.undo_revisions);
+            self.map.committer().thin(before, &self.settings.trajectory_spacing);
+            self.thinned = revision;
+        }
+    }
+
+    /// Appends a group and, where that is asked for, syncs it.
+    fn journal(&mut self, group: &[Pending]) -> Result<(), ServiceError> {
+        if let Some(stop) = self.stopped.get() {
+            return Err(stop.refusal(&self.name));
+        }
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        let records: Vec<&Record> = group.iter().filter_map(|pending| pending.record.as_ref()).collect();
+        folder.append(&records).map_err(|error| match error {
+            // Nothing was written.
+            StoreError::JournalStopped(_) | StoreError::Gone | StoreError::RevisionsUsedUp(_) => {
+                self.stop(&error)
+            }
+            error => self.lost_track(&error),
+        })?;
+        if folder.settings().durability == Durability::Always {
+            folder.sync().map_err(|error| self.lost_track(&error))?;
+        }
+        self.unsynced.get_or_insert_with(Instant::now);
+        Ok(())
+    }
+
+    /// Changes were handed to the journal, and nobody knows what became of them.
+    fn lost_track(&self, error: &StoreError) -> ServiceError {
+        self.stop(error);
+        outcome_unknown(&self.name, error)
+    }
+
+    /// From now on the map takes no changes: what the disk holds is unknown.
+    fn stop(&self, error: &StoreError) -> ServiceError {
+        if matches!(error, StoreError::Gone) {
+            return self.stopped.get_or_init(|| Stop::Deleted).refusal(&self.name);
+        }
+        tracing::error!(map = %self.name, %error, "the journal failed: the map is read only from now on");
+        self.stopped.get_or_init(|| Stop::Failed(error.to_string())).refusal(&self.name)
+    }
+
+    /// How long until what was written is to be synced.
+    fn until_sync(&self) -> Option<Duration> {
+        let Durability::Interval(interval) = self.folder.as_ref()?.settings().durability else {
+            return None;
+        };
+        Some(interval.saturating_sub(self.unsynced?.elapsed()))
+    }
+
+    fn sync_if_due(&mut self) {
+        if self.until_sync().is_some_and(|rest| rest.is_zero()) {
+            self.sync();
+        }
+    }
+
+    fn sync(&mut self) {
+        self.unsynced = None;
+        if let (Some(folder), None) = (&self.folder, self.stopped.get())
+            && let Err(error) = folder.sync()
+        {
+            self.stop(&error);
+        }
+        self.tell_durable();
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.stopped.get_or_init(|| Stop::Failed("a defect of the server ended its thread".into()));
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The operations on maps as a whole.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use super::map_file::from_file;
+use crate::caller::AllowedMaps;
+use crate::error::{Reason, ServiceError};
+use crate::map_service::MapService;
+use crate::maps::{HostedMap, Saving};
+use crate::observer::{Change, Outcome};
+use crate::request::{MapFile, MapInfo, UnavailableMap};
+use mrol_map::map::{MapName, MapSettings};
+use mrol_map::sync::polled_by_runtime;
+use mrol_map::util::StopSignal;
+
+/// Absent neighbors of occupied voxels on which a description measures each level's false positives.
+const RATE_SAMPLES: usize = 4096;
+
+impl MapService {
+    /// Makes a map; true when it was not there. The same settings again are fine.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for settings out of range, `Conflict` where it exists with others, `ResourceExhausted`
+    /// beyond `maps_max`, or while disk or memory is nearly full.
+    pub async fn create_map(
+        &self,
+        name: MapName,
+        settings: MapSettings,
+    ) -> Result<(MapInfo, bool), ServiceError> {
+        let map = &name.clone();
+        let work = async {
+            let name = self.allowed_maps.check(&name)?;
+            let is_new = self.inner.catalog.get(&name).is_err();
+            let settings = settings.checked()?;
+            if is_new {
+                self.inner.budget.check_to_grow()?;
+            }
+            let inner = Arc::clone(&self.inner);
+            let create = async move {
+                let _empty =
+                    is_new.then(|| inner.budget.reserve(settings.empty_filter_bytes())).transpose()?;
+                inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
+            };
+            let (map, created) = run_to_completion(create).await?;
+            Ok((describe_made(map).await?, created))
+        };
+        self.observed("CreateMap", Some(map), work, |(info, created)| {
+            let before = (!created).then_some(info.version);
+            Outcome::Changed(Change::of_map(before, Some(info.version)))
+        })
+        .await
+    }
+
+    /// Describes a map, with the last sighting of each robot.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
+        let work = async {
+            let map = self.map(name)?;
+            let sightings = map.robots.sightings.to_vec();
+            Ok(MapInfo { sightings, ..self.describe(map).await? })
+        };
+        self.observed("GetMap", Some(name), work, |_| Outcome::Read).await
+    }
+
+    /// Describes all maps that the caller may name, by name.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` when too many jobs wait.
+    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
+        let work = async {
+            let maps = self.inner.catalog.within(&self.allowed_maps);
+            let describe =
+                move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
+            self.inner.pools.queries.run(describe).await?
+        };
+        self.observed("ListMaps", None, work, |_| Outcome::Read).await
+    }
+
+    /// The names of the maps that the caller may name.
+    pub fn map_names(&self) -> Vec<MapName> {
+        self.inner.catalog.within(&self.allowed_maps).iter().map(|map| map.name.clone()).collect()
+    }
+
+    /// The maps that take no changes since their journal failed, by name, with the reason.
+    pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
+        let maps = self.inner.catalog.within(&self.allowed_maps);
+        maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
+    }
+
+    /// The maps that could not be opened, by name, with the reason and what helps. Their names are taken.
+    pub fn unavailable_maps(&self) -> Vec<UnavailableMap> {
+        self.inner.catalog.unavailable_within(&self.allowed_maps)
+    }
+
+    /// Takes a map out, in memory and on disk.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `Internal` when its file cannot be removed; `Unavailable` with `outcome_unknown`
+    /// when it is gone, and a loss of power may bring it back.
+    pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
+        let work = async {
+            let (inner, name) = (Arc::clone(&self.inner), self.allowed_maps.check(name)?);
+            run_to_completion(async move { inner.catalog.delete(&name).await }).await
+        };
+        let outcome = |version: &_| Outcome::Changed(Change::of_map(Some(*version), None));
+        self.observed("DeleteMap", Some(name), work, outcome).await.map(drop)
+    }
+
+    /// A map as a map file, at one revision.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, there is no memory for it, or the file
+    /// would be larger than `map_file_bytes_max`, so that nobody could restore it.
+    pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
+        let work = async {
+            let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
+            self.inner
+                .pools
+                .map_files
+                .run(move |stop| map.to_file(&inner.budget, &inner.settings.limits, stop))
+                .await?
+        };
+        self.observed("SnapshotMap", Some(name), work, |_| Outcome::Read).await
+    }
+
+    /// Makes a map from a map file, under a uuid of its own. With `replace` it takes the place of the map of that name,
+    /// if there is one, which is kept as `NAME-replaced-REVISION` until somebody deletes it.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a file that is none, or damaged; `Conflict` where there is a map of that name, unless `replace`
+    /// says that it is to be kept under another; `ResourceExhausted` beyond `map_file_bytes_max`, `maps_max`,
+    /// `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk or memory is
+    /// nearly full.
+    pub async fn restore_map(
+        &self,
+        name: MapName,
+        file: Bytes,
+        replace: bool,
+    ) -> Result<MapInfo, ServiceError> {
+        let map = &name.clone();
+        let work = async {
+            let name = self.allowed_maps.check(&name)?;
+            if replace && self.allowed_maps != AllowedMaps::Every {
+                let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
+                               delete the map first, or ask with such a key";
+                return Err(ServiceError::new(Reason::MapNotAllowed, message));
+            }
+            self.inner.budget.check_to_grow()?;
+            self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
+            let inner = Arc::clone(&self.inner);
+            let build =
+                move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
+            let built = self.inner.pools.map_files.run(build).await??;
+            let inner = Arc::clone(&self.inner);
+            let maps_max = self.limits().maps_max;
+            let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
+            let (before, map) = run_to_completion(restore).await?;
+            Ok((before, describe_made(map).await?))
+        };
+        let outcome =
+            |(before, info): &(_, MapInfo)| Outcome::Changed(Change::of_map(*before, Some(info.version)));
+        Ok(self.observed("RestoreMap", Some(map), work, outcome).await?.1)
+    }
+
+    /// Writes snapshots of the maps that changed since their last one; the number of them. Those for which there is no
+    /// room, on disk or in memory, are put off: the journal has all that they would hold.
+    ///
+    /// # Errors
+    /// `Internal` when a file cannot be written; the others are written all the same.
+    pub async fn save(&self) -> Result<usize, ServiceError> {
+        self.save_maps(Saving::Changed).await
+    }
+
+    /// Writes snapshots of the maps with much journal or an old snapshot; to be called every now and then.
+    ///
+    /// # Errors
+    /// As for [`MapService::save`].
+    pub async fn save_due(&self) -> Result<usize, ServiceError> {
+        let inner = Arc::clone(&self.inner);
+        let made_room =
+            self.inner.catalog.save(move |map| map.make_room(&inner.budget).map(|()| false)).await;
+        // The others are saved all the same: their journals grow just where there is no room.
+        let saved = self.save_maps(Saving::Due).await;
+        made_room.and(saved)
+    }
+
+    async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
+        let inner = Arc::clone(&self.inner);
+        self.inner.catalog.save(move |map| map.save(which, &inner.budget)).await
+    }
+
+    async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
+        self.inner.pools.queries.run(move |stop| map.describe(RATE_SAMPLES, stop)).await?
+    }
+}
+
+/// Describes a map that was just made, on no pool: who made it is told so, whatever the server has to do besides.
+async fn describe_made(map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
+    let described = tokio::task::spawn_blocking(move || map.describe(RATE_SAMPLES, StopSignal::NEVER));
+    described.await.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()))
+}
+
+/// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
+async fn run_to_completion<T: Send + 'static>(
+    change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
+) -> Result<T, ServiceError> {
+    let done = tokio::spawn(polled_by_runtime(change)).await;
+    done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Limits;
+    use crate::map_service::MapService;
+    use crate::settings::ServiceSettings;
+    use mrol_store::OpeningProgress;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn who_makes_a_map_is_told_so_whatever_the_server_has_to_do_besides() {
+        let settings = ServiceSettings {
+            query_threads: 1,
+            limits: Limits { jobs_waiting_max: 1, ..Limits::default() },
+            ..ServiceSettings::default()
+        };
+        let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+        let (hold, held) = std::sync::mpsc::channel::<()>();
+        let held = std::sync::Mutex::new(held);
+        let inner = Arc::clone(&service.inner);
+        let first = tokio::spawn(async move {
+            inner.pools.queries.run(move |_| held.lock().unwrap().recv().is_ok()).await
+        });
+        let inner = Arc::clone(&service.inner);
+        let second = tokio::spawn(async move { inner.pools.queries.run(|_| ()).await });
+        let waiting = || service.pools().iter().find(|pool| pool.name == "query").unwrap().waiting;
+        while waiting() == 0 {
+            tokio::task::yield_now().await;
+        }
+        let name = |n: u32| MapName::new(&format!("m{n}")).unwrap();
+        let settings = MapSettings::new(0.1, 4);
+        service.create_map(name(0), settings).await.unwrap();
+        assert_eq!(service.map_info(&name(0)).await.unwrap_err().reason, Reason::Overloaded);
+        for n in 0..5 {
+            let (info, created) = service.create_map(name(n), settings).await.unwrap();
+            assert_eq!((info.name, created), (name(n), n > 0), "map {n}");
+        }
+        drop(hold);
+        first.await.unwrap().unwrap();
+        second.await.unwrap().unwrap();
+    }
+}

@@ -1,0 +1,180 @@
+//! A handle on the service: its maps, and the caller on whose behalf they are named. Its operations are `impl MapService`
+//! blocks in the rooms of their kind.
+
+use std::sync::Arc;
+
+use super::caller::{AllowedMaps, AllowedScans};
+use super::commit::{Refusal, Step};
+use super::error::{Reason, ServiceError};
+use super::limits::Limits;
+use super::maps::{Catalog, HostedMap};
+use super::observer::{End, Ended, Outcome};
+use super::resources::{Readings, ResourceBudget, Shortage};
+use super::settings::ServiceSettings;
+use super::work::{Asker, FreeThread, Pool, PoolUse, Pools};
+use mrol_map::map::{CallerName, MapName};
+use mrol_map::util::StopSignal;
+use mrol_store::OpeningProgress;
+
+/// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
+///
+/// Each operation fails with `PermissionDenied` where the handle may not name the map.
+#[derive(Debug, Clone)]
+pub struct MapService {
+    pub(super) inner: Arc<Inner>,
+    pub(super) allowed_maps: AllowedMaps,
+    pub(super) scans: AllowedScans,
+    /// Whose requests a map remembers under this name.
+    pub(super) caller: Option<CallerName>,
+    /// Whom its work counts for, where callers take turns.
+    pub(super) asker: Asker,
+}
+
+#[derive(Debug)]
+pub(super) struct Inner {
+    pub(super) settings: ServiceSettings,
+    pub(super) catalog: Catalog,
+    pub(super) pools: Pools,
+    pub(super) budget: Arc<ResourceBudget>,
+}
+
+impl MapService {
+    /// Opens the service with the maps of its data folder; `progress` tells how far that has come. Reads files: not
+    /// for an async thread.
+    ///
+    /// # Errors
+    /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
+    pub fn open(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
+        settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
+        settings.filter.checked()?;
+        let inner = Inner {
+            catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
+            pools: Pools::start(&settings)?,
+            budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
+            settings,
+        };
+        Ok(Self {
+            inner: Arc::new(inner),
+            allowed_maps: AllowedMaps::Every,
+            scans: AllowedScans::default(),
+            caller: None,
+            asker: Asker::default(),
+        })
+    }
+
+    /// The same maps for a caller of a name, who may name no others than those of `allowed_maps`, and send and undo no others than
+    /// the scans of `scans`.
+    pub fn limited_to(
+        &self,
+        caller: Option<CallerName>,
+        allowed_maps: AllowedMaps,
+        scans: AllowedScans,
+    ) -> Self {
+        let asker = self.asker.clone();
+        Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller, asker }
+    }
+
+    /// The same, where work counts for `asker`: callers take turns at the threads for questions.
+    #[must_use]
+    pub fn asked_by(self, asker: Asker) -> Self {
+        Self { asker, ..self }
+    }
+
+    /// The bounds on what callers may ask.
+    pub fn limits(&self) -> &Limits {
+        &self.inner.settings.limits
+    }
+
+    /// The filter of maps whose makers do not say.
+    pub fn default_filter(&self) -> mrol_map::bloom::FilterSettings {
+        self.inner.settings.filter
+    }
+
+    /// Looks how full disk and memory are; to be called every second or so. May block: not for an async thread.
+    pub fn measure(&self) -> Readings {
+        self.inner.catalog.all().iter().for_each(|map| map.robots.lost.forget_old());
+        self.inner.budget.look()
+    }
+
+    /// What there is too little of, and changes are refused for.
+    pub fn shortages(&self) -> Vec<Shortage> {
+        self.inner.budget.shortages()
+    }
+
+    /// What the threads for work that uses the CPU are doing.
+    pub fn pools(&self) -> [PoolUse; 12] {
+        self.inner.pools.in_use()
+    }
+
+    /// Does `work`, and tells the observers how the operation ended, with what `outcome` makes of the answer. They are
+    /// told where the caller goes away as well.
+    pub(super) async fn observed<A>(
+        &self,
+        operation: &'static str,
+        map: Option<&MapName>,
+        work: impl Future<Output = Result<A, ServiceError>>,
+        outcome: impl FnOnce(&A) -> Outcome,
+    ) -> Result<A, ServiceError> {
+        let pending = Pending { service: self, operation, map };
+        let answer = work.await;
+        std::mem::forget(pending);
+        let end = match &answer {
+            Ok(answer) => End::Done(outcome(answer)),
+            Err(error) => End::Failed(error),
+        };
+        self.tell(&Ended { operation, caller: self.caller.as_ref(), map, end });
+        answer
+    }
+
+    fn tell(&self, ended: &Ended<'_>) {
+        self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
+    }
+
+    /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares it
+    /// again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it.
+    pub(super) async fn submit_and_wait<A: Send + 'static>(
+        &self,
+        pool: &Pool,
+        mut first: Option<FreeThread>,
+        submit: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
+    ) -> Result<A, ServiceError> {
+        loop {
+            let thread = match first.take() {
+                Some(thread) => thread,
+                None => pool.thread().await?,
+            };
+            match pool.run_on(thread, submit.clone()).await?? {
+                Step::Answered(answer) => return Ok(answer),
+                Step::Submitted(outcome, answer) => match outcome.await.map_err(commit_thread_ended)? {
+                    Ok(committed) => return Ok(answer(committed)),
+                    Err(Refusal::Failed(error)) => return Err(error),
+                    Err(Refusal::Stale) => {}
+                },
+            }
+        }
+    }
+
+    pub(super) fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
+        self.inner.catalog.get(&self.allowed_maps.check(name)?)
+    }
+}
+
+/// An operation that is not over: dropped, its caller has gone.
+struct Pending<'a> {
+    service: &'a MapService,
+    operation: &'static str,
+    map: Option<&'a MapName>,
+}
+
+impl Drop for Pending<'_> {
+    fn drop(&mut self) {
+        let Self { service, operation, map } = *self;
+        let caller = service.caller.as_ref();
+        service.tell(&Ended { operation, caller, map, end: End::CallerGone });
+    }
+}
+
+/// The map's thread is gone, by a defect.
+pub(super) fn commit_thread_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
+    ServiceError::new(Reason::JobPanicked, "the change failed by a defect of the server")
+}

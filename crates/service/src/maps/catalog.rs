@@ -1,0 +1,405 @@
+//! The maps by name, in memory and on disk.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use uuid::Uuid;
+
+use super::built_map::BuiltMap;
+use super::hosted_map::HostedMap;
+use super::named::Named;
+use super::opening::{not_stored, open_all};
+use crate::caller::{AllowedMaps, Reachable};
+use crate::commit::CommitThread;
+use crate::error::{ErrorCode, Reason, ServiceError};
+use crate::request::{MapVersion, UnavailableMap};
+use mrol_map::bloom::FilterSettings;
+use mrol_map::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
+use mrol_map::sync::{Rank, RwLock};
+use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
+
+/// How long who makes, replaces or deletes a map waits for the one before: as long as a disk may reasonably take.
+const TURN_MAX: Duration = Duration::from_secs(10);
+
+/// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
+#[derive(Debug)]
+pub(crate) struct Catalog {
+    maps: RwLock<Named>,
+    data_dir: Option<Arc<DataDir>>,
+    settings: StoreSettings,
+    writing: tokio::sync::Mutex<()>,
+}
+
+impl Catalog {
+    /// Opens the maps of `data_dir`, as many as can be opened; without one, nothing outlives the process.
+    pub(crate) fn open(
+        data_dir: Option<&Path>,
+        settings: &StoreSettings,
+        progress: &OpeningProgress,
+    ) -> Result<Self, ServiceError> {
+        let open = |path: &Path| DataDir::open(path, settings.clone());
+        let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
+        let maps = data_dir.as_ref().map(|data_dir| open_all(data_dir, settings, progress)).transpose()?;
+        let (maps, data_dir) = (RwLock::new(Rank::Brief, maps.unwrap_or_default()), data_dir.map(Arc::new));
+        Ok(Self { maps, data_dir, settings: settings.clone(), writing: Default::default() })
+    }
+
+    pub(crate) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
+        let name = name.name();
+        let maps = self.maps.read();
+        let missing = || match maps.unavailable.get(name) {
+            Some(reason) => unavailable(name, reason),
+            None => {
+                let message = format!("map {name} does not exist: make it first, or list the maps there are");
+                ServiceError::new(Reason::MapNotFound, message)
+            }
+        };
+        maps.open.get(name).cloned().ok_or_else(missing)
+    }
+
+    /// The map of that name; none where the name is free.
+    fn find(&self, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
+        match self.get(name) {
+            Ok(map) => Ok(Some(map)),
+            Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The maps that a caller may name.
+    pub(crate) fn within(&self, allowed_maps: &AllowedMaps) -> Vec<Arc<HostedMap>> {
+        self.maps.read().open.values().filter(|map| allowed_maps.covers(&map.name)).cloned().collect()
+    }
+
+    /// Those that could not be opened.
+    pub(crate) fn unavailable_within(&self, allowed_maps: &AllowedMaps) -> Vec<UnavailableMap> {
+        let maps = self.maps.read();
+        let reachable = maps.unavailable.iter().filter(|(name, _)| allowed_maps.covers(name));
+        reachable
+            .map(|(name, reason)| UnavailableMap { name: name.clone(), reason: reason.clone() })
+            .collect()
+    }
+
+    pub(crate) fn all(&self) -> Vec<Arc<HostedMap>> {
+        self.maps.read().open.values().cloned().collect()
+    }
+
+    /// The map of that name; true when it was not there.
+    pub(crate) async fn create(
+        &self,
+        name: Reachable,
+        settings: MapSettings,
+        maps_max: usize,
+    ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
+        // One that is there already waits for nobody's disk.
+        let found = self.find(&name)?;
+        if let Some(map) = found {
+            return same_settings(map, settings).map(|map| (map, false));
+        }
+        let _writing = self.turn_to_write().await?;
+        let found = self.find(&name)?;
+        if let Some(map) = found {
+            return same_settings(map, settings).map(|map| (map, false));
+        }
+        self.check_room(maps_max)?;
+        let empty = move || Ok(MultiResolutionMap::new(settings)?);
+        self.add(name.name(), Uuid::new_v4(), empty).await.map(|map| (map, true))
+    }
+
+    /// A map that was built of a map file under a name that is free; with `replace` under any, where the map that was
+    /// there is kept under another name. Beside it the version of the map that had the name.
+    pub(crate) async fn restore(
+        &self,
+        name: Reachable,
+        built: BuiltMap,
+        maps_max: usize,
+        replace: bool,
+    ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
+        let _writing = self.turn_to_write().await?;
+        self.check_free(&name, maps_max, replace)?;
+        let old = self.find(&name)?;
+        // `saving` is held until its snapshot is written.
+        let BuiltMap { uuid, map, saving: _saving } = built;
+        let build = move || Ok(map);
+        let map = match &old {
+            None => self.add(name.name(), uuid, build).await?,
+            Some(old) => self.replace(Arc::clone(old), uuid, build).await?,
+        };
+        // Only now does it change no more.
+        Ok((old.map(|old| old.version_now()), map))
+    }
+
+    /// Refuses a map file for which there is no place, before any work is done for it.
+    pub(crate) fn check_free(
+        &self,
+        name: &Reachable,
+        maps_max: usize,
+        replace: bool,
+    ) -> Result<(), ServiceError> {
+        if self.find(name)?.is_some() && !replace {
+            let name = name.name();
+            let message =
+                format!("map {name} exists: delete it first, restore under another name, or replace it");
+            return Err(ServiceError::new(Reason::MapExists, message));
+        }
+        self.check_room(maps_max)
+    }
+
+    /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up who has it.
+    async fn turn_to_write(&self) -> Result<tokio::sync::MutexGuard<'_, ()>, ServiceError> {
+        let turn = tokio::time::timeout(TURN_MAX, self.writing.lock()).await;
+        turn.map_err(|_| {
+            let message = format!(
+                "another map has been made, replaced or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
+                 try again"
+            );
+            ServiceError::new(Reason::CatalogBusy, message).retry_after(TURN_MAX)
+        })
+    }
+
+    fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
+        let maps = self.maps.read();
+        let count = maps.open.len() + maps.unavailable.len();
+        if count < maps_max {
+            return Ok(());
+        }
+        let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
+        Err(ServiceError::new(Reason::TooManyMaps, message))
+    }
+
+    /// Takes a map into the catalog, kept and named; the caller holds `writing`. It is built before it is kept: one that
+    /// the server cannot build is not found again at its next start.
+    async fn add(
+        &self,
+        name: &MapName,
+        uuid: Uuid,
+        build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let (data_dir, of, settings) = (self.data_dir.clone(), name.clone(), self.settings.clone());
+        let map = blocking(move || {
+            let (map, thread) = (build()?, CommitThread::start(&of)?);
+            let create = |data_dir: Arc<DataDir>| data_dir.create(&of, &Snapshot::of(&map, uuid));
+            let folder = data_dir.map(create).transpose().map_err(not_stored)?;
+            Ok(Arc::new(HostedMap::new(thread, of, uuid, map, folder, &settings)))
+        })
+        .await?;
+        self.maps.write().open.insert(name.clone(), Arc::clone(&map));
+        Ok(map)
+    }
+
+    /// Puts another map in the place of `old`, which gets a name of its own; the caller holds `writing`.
+    async fn replace(
+        &self,
+        old: Arc<HostedMap>,
+        uuid: Uuid,
+        build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
+        let taken: Vec<MapName> = {
+            let maps = self.maps.read();
+            maps.open.keys().chain(maps.unavailable.keys()).cloned().collect()
+        };
+        let exchanged = blocking(move || {
+            let map = build()?;
+            let [thread, thread_of_old] = [CommitThread::start(&old.name)?, CommitThread::start(&old.name)?];
+            // Its revision, and so its new name, is known from now on.
+            old.commit_queue.end_replaced();
+            let synced = old.folder.as_ref().map_or(Ok(()), |folder| folder.sync()).map_err(not_stored);
+            let kept = name_of_replaced(&old.name, old.map.revision(), &taken);
+            let exchange = || {
+                let kept = synced.and(kept)?;
+                let replace = |data_dir: Arc<DataDir>| match &old.folder {
+                    Some(folder) => {
+                        let first = Snapshot::of(&map, uuid);
+                        data_dir.replace(&old.name, folder, &kept, &first).map(Some).map_err(not_stored)
+                    }
+                    None => Ok(None),
+                };
+                data_dir.map_or(Ok(None), replace).map(|folder| (kept, folder))
+            };
+            match exchange() {
+                Ok((kept, folder)) => {
+                    let kept = old.again_as(thread_of_old, kept, &settings);
+                    let new = HostedMap::new(thread, old.name.clone(), uuid, map, folder, &settings);
+                    Ok((Arc::new(new), Arc::new(kept), None))
+                }
+                Err(error) => {
+                    let old = Arc::new(old.again_as(thread_of_old, old.name.clone(), &settings));
+                    Ok((Arc::clone(&old), old, Some(error)))
+                }
+            }
+        });
+        let (there, kept, error): (Arc<HostedMap>, Arc<HostedMap>, Option<ServiceError>) = exchanged.await?;
+        let mut maps = self.maps.write();
+        maps.open.insert(kept.name.clone(), Arc::clone(&kept));
+        maps.open.insert(name.clone(), Arc::clone(&there));
+        drop(maps);
+        if let Some(error) = error {
+            return Err(error);
+        }
+        tracing::info!(map = %name, kept = %kept.name, "replaced");
+        Ok(there)
+    }
+
+    /// Takes a map out; its last version.
+    pub(crate) async fn delete(&self, name: &Reachable) -> Result<MapVersion, ServiceError> {
+        let _writing = self.turn_to_write().await?;
+        let map = self.get(name)?;
+        let folder = map.folder.clone();
+        let removed =
+            self.on_disk(move |data_dir| folder.map_or(Ok(()), |folder| data_dir.remove(&folder))).await;
+        let is_gone = map.folder.as_deref().is_none_or(MapFolder::is_gone);
+        if is_gone {
+            self.maps.write().open.remove(&map.name);
+            // Who still holds the map may read it, but nothing is kept of it any more.
+            map.commit_queue.end();
+        }
+        let version = map.version_now();
+        removed.map(|_| version).map_err(|error| match is_gone {
+            true => {
+                let message = format!(
+                    "map {} is gone, but the disk did not say that this outlives a loss of power ({}): look whether it \
+                     is there after the next restart",
+                    map.name, error.message
+                );
+                ServiceError::new(Reason::OutcomeUnknown, message)
+            }
+            false => error,
+        })
+    }
+
+    /// Writes a snapshot of each map by `save`, which says whether it did; the number of those that it wrote. One that
+    /// cannot be written keeps none of the others from it.
+    pub(crate) async fn save(
+        &self,
+        save: impl Fn(&HostedMap) -> Result<bool, StoreError> + Clone + Send + 'static,
+    ) -> Result<usize, ServiceError> {
+        let (mut saved, mut failed) = (0, None);
+        for map in self.all() {
+            let save = save.clone();
+            match self.on_disk(move |_| save(&map)).await {
+                Ok(written) => saved += usize::from(written.unwrap_or(false)),
+                Err(error) => failed = Some(error),
+            }
+        }
+        failed.map_or(Ok(saved), Err)
+    }
+
+    /// Does something with the data folder on a thread that may block; nothing without one.
+    async fn on_disk<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&DataDir) -> Result<T, StoreError> + Send + 'static,
+    ) -> Result<Option<T>, ServiceError> {
+        let Some(data_dir) = self.data_dir.clone() else {
+            return Ok(None);
+        };
+        blocking(move || job(&data_dir).map(Some).map_err(not_stored)).await
+    }
+}
+
+fn unavailable(name: &MapName, reason: &str) -> ServiceError {
+    let message = format!("map {name} could not be opened: {reason}; then restart the server");
+    ServiceError::new(Reason::MapUnavailable, message)
+}
+
+/// The name that a map gets whose name another takes: `NAME-replaced-REVISION`, cut to fit.
+fn name_of_replaced(name: &MapName, revision: u64, taken: &[MapName]) -> Result<MapName, ServiceError> {
+    let candidate = |again: u32| {
+        let again = if again == 1 { String::new() } else { format!("-{again}") };
+        let end = format!("-replaced-{revision}{again}");
+        let start: String = name.as_str().chars().take(NAME_LENGTH_MAX - end.len()).collect();
+        MapName::new(&format!("{start}{end}"))
+    };
+    let mut names = (1..=taken.len() as u32 + 1).map(candidate);
+    let free = names.find(|name| name.as_ref().map_or(true, |name| !taken.contains(name)));
+    let none = || ServiceError::new(Reason::MapExists, format!("no name is free for {name}"));
+    Ok(free.ok_or_else(none)??)
+}
+
+/// Does something on a thread that may block.
+async fn blocking<T: Send + 'static>(
+    job: impl FnOnce() -> Result<T, ServiceError> + Send + 'static,
+) -> Result<T, ServiceError> {
+    let done = tokio::task::spawn_blocking(job).await;
+    done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
+}
+
+/// Making a map again as it is changes nothing; as another it is a conflict.
+fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<HostedMap>, ServiceError> {
+    let there = map.map.settings();
+    if *there == settings {
+        return Ok(map);
+    }
+    let (there, wanted) = (description(there), description(&settings));
+    let message = format!("map {} exists with {there}, not with {wanted}", map.name);
+    Err(ServiceError::new(Reason::MapExists, message))
+}
+
+/// All settings of a map as text.
+fn description(settings: &MapSettings) -> String {
+    let MapSettings { resolution_m, levels, filter, moments } = settings;
+    let filter = filter.map_or("no filter".to_owned(), |FilterSettings { hashes, bits_per_key }| {
+        format!("filter_hashes {hashes}, filter_bits_per_key {bits_per_key}")
+    });
+    let moments = if *moments { "moments" } else { "no moments" };
+    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Marks;
+    use crate::resources::ResourceBudget;
+    use mrol_map::map::MapContents;
+    use mrol_map::voxel::VoxelSet;
+
+    const MAPS_MAX: usize = 8;
+
+    #[test]
+    fn the_name_of_a_replaced_map_fits_and_is_free() {
+        let name = |text: &str| MapName::new(text).unwrap();
+        let office = name("office");
+        let first = name_of_replaced(&office, 41, std::slice::from_ref(&office)).unwrap();
+        assert_eq!(first, name("office-replaced-41"));
+        let second = name_of_replaced(&office, 41, &[office.clone(), first]).unwrap();
+        assert_eq!(second, name("office-replaced-41-2"));
+        let long = name(&"a".repeat(NAME_LENGTH_MAX));
+        let cut = name_of_replaced(&long, 1 << 53, &[]).unwrap();
+        assert_eq!(cut.as_str().len(), NAME_LENGTH_MAX);
+        assert!(cut.as_str().ends_with("a-replaced-9007199254740992"), "{cut:?}");
+    }
+    fn named(name: &str) -> Reachable {
+        AllowedMaps::Every.check(&MapName::new(name).unwrap()).unwrap()
+    }
+
+    fn built(settings: MapSettings) -> BuiltMap {
+        let contents = MapContents::at(0, VoxelSet::default());
+        let map = MultiResolutionMap::restore(settings, contents).unwrap();
+        let saving = ResourceBudget::new(None, Marks::default()).reserve(0).unwrap();
+        BuiltMap { uuid: Uuid::nil(), map, saving }
+    }
+
+    /// What is told within ten times as long as anybody is to wait for its turn to make, replace or delete a map.
+    async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> Reason {
+        let ended = tokio::time::timeout(10 * TURN_MAX, waiting).await.expect("it does not wait for ever");
+        ended.map(drop).map_err(|error| error.reason).expect_err("it has no turn")
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
+        let progress = OpeningProgress::default();
+        let catalog = Catalog::open(None, &StoreSettings::default(), &progress).unwrap();
+        let settings = MapSettings::new(0.1, 4);
+        catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
+        let turn = catalog.writing.lock().await;
+        let busy = Reason::CatalogBusy;
+        assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX)).await, busy);
+        assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
+        assert_eq!(told(catalog.delete(&named("there"))).await, busy);
+        // What is there already waits for nobody.
+        assert!(!catalog.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
+        drop(turn);
+        assert!(catalog.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
+    }
+}

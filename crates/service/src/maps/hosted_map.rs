@@ -1,0 +1,217 @@
+//! A map under a name: what the service keeps about it besides the map itself.
+
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use uuid::Uuid;
+
+use super::followers::Followers;
+use super::keep_out_expiry::KeepOutExpiry;
+use super::robots::Robots;
+use super::snapshots::Snapshots;
+use crate::commit::{CommitQueue, CommitThread, Stop};
+use crate::error::{Reason, ServiceError};
+use crate::request::{MapInfo, MapStorage, MapVersion};
+use crate::work::ended_early;
+use mrol_map::map::{ContentVersion, MapName, MultiResolutionMap};
+use mrol_map::planning::Planner;
+use mrol_map::util::StopSignal;
+use mrol_store::{FolderUse, MapFolder, StoreError, StoreSettings};
+
+/// A named map and who waits for it.
+#[derive(Debug)]
+pub(crate) struct HostedMap {
+    pub(crate) name: MapName,
+    pub(crate) uuid: Uuid,
+    pub(crate) map: Arc<MultiResolutionMap>,
+    /// What keeps it across restarts, where anything does.
+    pub(crate) folder: Option<Arc<MapFolder>>,
+    pub(crate) commit_queue: CommitQueue,
+    pub(crate) followers: Followers,
+    pub(crate) robots: Robots,
+    /// What makes checks of bodies fast, once somebody asked for one.
+    pub(crate) planner: OnceLock<Planner>,
+    /// One undo is found out and made before the next is looked at.
+    pub(crate) undo_lock: Arc<tokio::sync::Mutex<()>>,
+    pub(super) snapshots: Snapshots,
+    pub(crate) keep_out_expiry: KeepOutExpiry,
+}
+
+/// Seed of the sample on which false positives are measured: the same map gives the same figures.
+const RATE_SEED: u64 = 1;
+
+impl HostedMap {
+    /// Takes a map into service; `thread` makes its changes.
+    pub(crate) fn new(
+        thread: CommitThread,
+        name: MapName,
+        uuid: Uuid,
+        map: impl Into<Arc<MultiResolutionMap>>,
+        folder: Option<MapFolder>,
+        settings: &StoreSettings,
+    ) -> Self {
+        Self::of_shared(thread, name, uuid, map.into(), folder.map(Arc::new), settings)
+    }
+
+    /// This map under the name `name`, once it has ended under its own.
+    pub(super) fn again_as(&self, thread: CommitThread, name: MapName, settings: &StoreSettings) -> Self {
+        Self::of_shared(thread, name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
+    }
+
+    fn of_shared(
+        thread: CommitThread,
+        name: MapName,
+        uuid: Uuid,
+        map: Arc<MultiResolutionMap>,
+        folder: Option<Arc<MapFolder>>,
+        settings: &StoreSettings,
+    ) -> Self {
+        let (followers, published) = Followers::new(map.revision(), settings.watch_bytes_max);
+        let commit_queue =
+            CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), published, settings);
+        Self {
+            name,
+            uuid,
+            map,
+            folder,
+            commit_queue,
+            followers,
+            robots: Robots::default(),
+            planner: OnceLock::new(),
+            undo_lock: Arc::default(),
+            snapshots: Snapshots::default(),
+            keep_out_expiry: KeepOutExpiry::default(),
+        }
+    }
+
+    /// Refuses changes that would be refused in the end, before any work is done for them.
+    pub(crate) fn check_writable(&self) -> Result<(), ServiceError> {
+        self.commit_queue.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
+    }
+
+    /// Why there is nothing more to tell of this map.
+    pub(crate) fn ended(&self) -> ServiceError {
+        let gone = || ServiceError::new(Reason::MapNotFound, format!("map {} is gone", self.name));
+        self.commit_queue.stopped().map_or_else(gone, |stop| stop.refusal(&self.name))
+    }
+
+    pub(crate) fn version(&self, ContentVersion { revision, hash }: ContentVersion) -> MapVersion {
+        MapVersion { revision, map_uuid: self.uuid, content_hash: Some(hash) }
+    }
+
+    /// The map as it is.
+    pub(crate) fn version_now(&self) -> MapVersion {
+        self.version(self.map.content_version())
+    }
+
+    /// The map as it was at a revision, of which a change told before.
+    pub(crate) fn version_at(&self, revision: u64) -> MapVersion {
+        let now = self.version_now();
+        let content_hash = now.content_hash.filter(|_| now.revision == revision);
+        MapVersion { revision, content_hash, ..now }
+    }
+
+    /// Waits until `revision` is there. Who waits hears of the map's end at once.
+    pub(crate) async fn wait_for_revision(
+        &self,
+        revision: u64,
+        wait_max: Duration,
+    ) -> Result<(), ServiceError> {
+        if self.followers.wait_for_revision(revision, wait_max, &self.commit_queue).await {
+            return Ok(());
+        }
+        if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.commit_queue.stopped() {
+            return Err(stop.refusal(&self.name));
+        }
+        let message = format!(
+            "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
+            self.name,
+            self.map.revision()
+        );
+        Err(ServiceError::new(Reason::RevisionNotReached, message))
+    }
+
+    pub(crate) fn check_level(&self, level: u32) -> Result<(), ServiceError> {
+        let levels = self.map.settings().levels;
+        if level < levels {
+            return Ok(());
+        }
+        let message = format!("level must lie in 0..={} of map {}, got {level}", levels - 1, self.name);
+        Err(ServiceError::new(Reason::LevelOutOfRange, message))
+    }
+
+    pub(crate) fn check_uuid(&self, uuid: Option<Uuid>) -> Result<(), ServiceError> {
+        if uuid.is_none_or(|uuid| uuid == self.uuid) {
+            return Ok(());
+        }
+        let message =
+            format!("map_uuid of map {} is {}: it was deleted and made again", self.name, self.uuid);
+        Err(ServiceError::new(Reason::MapReplaced, message))
+    }
+
+    pub(crate) fn describe(
+        &self,
+        rate_samples: usize,
+        stop: StopSignal<'_>,
+    ) -> Result<MapInfo, ServiceError> {
+        let Some(described) = self.map.describe_until(rate_samples, RATE_SEED, stop) else {
+            return Err(ended_early(stop));
+        };
+        let (storage, trajectory) = (self.storage(), self.map.trajectory());
+        Ok(MapInfo {
+            name: self.name.clone(),
+            version: self.version(described.version),
+            settings: *self.map.settings(),
+            levels: described.levels,
+            scans: trajectory.len(),
+            robots: trajectory.robots(),
+            sightings: Vec::new(),
+            set_bytes: described.set_bytes,
+            moment_bytes: described.moment_bytes,
+            commits: self.commit_queue.durations(),
+            trajectory_bytes: described.trajectory_bytes,
+            viewpoints: described.viewpoints,
+            viewpoint_bytes: described.viewpoint_bytes,
+            storage,
+        })
+    }
+
+    /// Why the map takes no changes.
+    pub(crate) fn failure(&self) -> Option<&str> {
+        match self.commit_queue.stopped()? {
+            Stop::Failed(reason) => Some(reason),
+            Stop::Deleted | Stop::Replaced => None,
+        }
+    }
+
+    /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
+    pub(crate) fn unreadable(&self, error: &StoreError) -> ServiceError {
+        match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
+            true => Stop::Deleted.refusal(&self.name),
+            false => ServiceError::new(Reason::JournalUnreadable, error.to_string()),
+        }
+    }
+
+    /// Of a map in memory only, of which `what` would need the journal.
+    pub(crate) fn no_journal(&self, what: &str) -> ServiceError {
+        let message =
+            format!("map {} is kept in memory only: {what} needs the journal of a data folder", self.name);
+        ServiceError::new(Reason::NoJournal, message)
+    }
+
+    fn storage(&self) -> Option<MapStorage> {
+        let folder = self.folder.as_ref()?;
+        let used: FolderUse = folder.used();
+        let undo_from_revision = folder.undo_from(self.map.trajectory().withdrawn());
+        Some(MapStorage {
+            durable_revision: used.durable,
+            snapshot_revision: used.snapshot,
+            undo_from_revision,
+            journal: used.journal,
+            snapshot_age: used.snapshot_age,
+            snapshot_failures: used.snapshot_failures,
+            disk_bytes: used.disk_bytes,
+            failure: self.failure().map(str::to_owned),
+        })
+    }
+}

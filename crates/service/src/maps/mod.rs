@@ -1,0 +1,26 @@
+//! The maps by name, and what the service keeps about each.
+//!
+//! A [`Catalog`] has a [`HostedMap`] for each name. What a hosted map is made of stands beside it: `followers`, `robots`,
+//! `snapshots`, `keep_out_expiry`. What is done with a hosted map is in the rooms above, as further `impl HostedMap`
+//! blocks.
+
+mod built_map;
+mod catalog;
+mod event_log;
+mod followers;
+mod full_state;
+mod hosted_map;
+mod keep_out_expiry;
+mod named;
+mod opening;
+mod robots;
+mod saving;
+mod snapshots;
+
+pub(crate) use built_map::BuiltMap;
+pub(crate) use catalog::Catalog;
+pub use event_log::EVENTS_MAX;
+pub(crate) use full_state::FullState;
+pub(crate) use hosted_map::HostedMap;
+pub(crate) use saving::Saving;
+pub(crate) use snapshots::snapshot_bytes;

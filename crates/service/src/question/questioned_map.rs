@@ -1,0 +1,96 @@
+//! A map that questions are asked of, the server's or a replica's.
+
+use std::sync::{Arc, OnceLock};
+
+use super::asked::Asked;
+use crate::error::ServiceError;
+use crate::work::{check_not_stopped, ended_early};
+use mrol_map::map::{ContentVersion, MapView, MultiResolutionMap};
+use mrol_map::planning::{Planner, PlanningView, Surroundings, Unknown};
+use mrol_map::util::StopSignal;
+
+/// Elements up to which a question is answered without keeping changes from beginning meanwhile: some milliseconds.
+const SHORT_ELEMENTS: usize = 4096;
+
+/// A map that questions are asked of, and the planner of it, which is made when it is first needed.
+#[derive(Debug, Clone, Copy)]
+pub struct QuestionedMap<'a> {
+    map: &'a Arc<MultiResolutionMap>,
+    planner: &'a OnceLock<Planner>,
+    field_bytes_max: usize,
+    may_wait: bool,
+}
+
+impl<'a> QuestionedMap<'a> {
+    /// The map, with a place for its planner, whose fields hold at most so many bytes.
+    pub fn new(
+        map: &'a Arc<MultiResolutionMap>,
+        planner: &'a OnceLock<Planner>,
+        field_bytes_max: usize,
+    ) -> Self {
+        Self { map, planner, field_bytes_max, may_wait: true }
+    }
+
+    /// The map for threads that may not wait: where a view of it has to be waited for, there is none.
+    pub(super) fn at_once(self) -> Self {
+        Self { may_wait: false, ..self }
+    }
+
+    /// The planner, which keeps what makes checks of bodies fast.
+    pub(super) fn planner(&self) -> &'a Planner {
+        self.planner.get_or_init(|| Planner::with_field_bytes(Arc::clone(self.map), self.field_bytes_max))
+    }
+
+    /// A view of the whole map for checks of bodies among what counts.
+    ///
+    /// # Errors
+    /// How the question was stopped: also where the view has to be waited for and must not be.
+    pub(super) fn planning_view(
+        &self,
+        asked: &Asked,
+        surroundings: &Surroundings,
+        stop: StopSignal<'_>,
+    ) -> Result<PlanningView<'a>, ServiceError> {
+        let counts_keep_outs = !asked.ignore_keep_outs;
+        let view = match (self.may_wait, surroundings.unknown) {
+            (true, unknown) => {
+                let view = self.planner().view();
+                let view = if counts_keep_outs { view.with_keep_outs() } else { view };
+                Some(if unknown == Unknown::Occupied { view.with_viewpoints() } else { view })
+            }
+            (false, Unknown::Free) => {
+                let view = self.planner.get().and_then(Planner::try_view);
+                view.and_then(|view| if counts_keep_outs { view.try_with_keep_outs() } else { Some(view) })
+            }
+            // Who takes viewpoints may have to mend the fields by them.
+            (false, Unknown::Occupied) => None,
+        };
+        view.ok_or_else(|| ended_early(stop))
+    }
+
+    /// A view of the whole map; none where it has to be waited for and must not be.
+    fn view(&self, asked: &Asked) -> Option<MapView<'a>> {
+        match (self.may_wait, asked.ignore_keep_outs) {
+            (true, true) => Some(self.map.view().with_viewpoints()),
+            (true, false) => Some(self.map.view().with_keep_outs().with_viewpoints()),
+            (false, true) => self.map.try_view()?.try_with_viewpoints(),
+            (false, false) => self.map.try_view()?.try_with_keep_outs()?.try_with_viewpoints(),
+        }
+    }
+
+    /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
+    /// are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for this one.
+    pub(super) fn in_view<A>(
+        &self,
+        asked: &Asked,
+        elements: usize,
+        stop: StopSignal<'_>,
+        f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
+    ) -> Result<(A, ContentVersion), ServiceError> {
+        let _long_read = (elements > SHORT_ELEMENTS && self.may_wait).then(|| self.map.long_read());
+        let view = self.view(asked).ok_or_else(|| ended_early(stop))?;
+        let answer = f(&view)?;
+        check_not_stopped(stop)?;
+        Ok((answer, view.version()))
+    }
+}

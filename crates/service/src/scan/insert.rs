@@ -1,0 +1,100 @@
+//! Inserting and aligning scans: whose turn it is, on which threads, and for how long.
+
+use std::sync::Arc;
+
+use super::events::PendingEvent;
+use super::submit::{Effort, Judged};
+use crate::error::ServiceError;
+use crate::map_service::MapService;
+use crate::maps::HostedMap;
+use crate::observer::{JudgedScan, Outcome};
+use crate::request::{ScanAnswer, ScanRequest};
+use crate::work::{Pools, TimeLimit};
+use mrol_map::map::MapName;
+use mrol_map::util::StopSignal;
+
+impl MapService {
+    /// Aligns a scan and, where it fits, adds it.
+    ///
+    /// # Errors
+    /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
+    /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
+    /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
+    pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let robot = scan.robot.clone();
+        let work = async {
+            self.scans.permit(&scan.robot)?;
+            let (map, scan) = (self.map(map)?, Arc::new(scan));
+            let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
+            let judged = self.judge(&map, &scan).await;
+            pending.end(&judged);
+            let Judged { answer, .. } = judged?;
+            if !answer.accepted {
+                self.search_for_robot_of(map, &scan);
+            }
+            Ok(answer)
+        };
+        self.observed("InsertScan", Some(map), work, |answer| {
+            Outcome::Scan(JudgedScan {
+                robot,
+                verdict: answer.verdict,
+                overlap: answer.overlap(),
+                align_time: answer.align_time,
+                replayed: answer.replayed,
+                recovered: answer.recovered,
+            })
+        })
+        .await
+    }
+
+    /// Aligns a scan and, where it fits, adds it: from its guess alone where that will do, or else as far as it takes.
+    async fn judge(&self, map: &Arc<HostedMap>, scan: &Arc<ScanRequest>) -> Result<Judged, ServiceError> {
+        scan.check_insertion()?;
+        scan.check_points(self.limits())?;
+        if map.is_new(scan) {
+            self.inner.budget.check_to_grow()?;
+        }
+        let robot_lock =
+            Arc::new(self.inner.pools.mapping.in_turn(map.robots.lock_robot(&scan.robot)).await?);
+        let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
+        let submit = |effort| {
+            let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(map), Arc::clone(scan));
+            let (robot_lock, limit) = (Arc::clone(&robot_lock), limit.clone());
+            move |stop: StopSignal<'_>| {
+                limit.run(stop, |stop| {
+                    let robot_lock = Arc::clone(&robot_lock);
+                    map.submit_scan(&scan, robot_lock, effort, &inner.settings, &inner.budget, stop)
+                })
+            }
+        };
+        let Pools { mapping, long_mapping, .. } = &self.inner.pools;
+        let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
+        loop {
+            if let Some(judged) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
+                return Ok(judged);
+            }
+            (pool, effort) = (long_mapping, Effort::Whole);
+            thread = Some(limit.wait(pool.thread()).await??);
+        }
+    }
+
+    /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
+    ///
+    /// # Errors
+    /// As for an insertion; the limit is `alignment_time_max`.
+    pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let work = async {
+            self.scans.permit(&scan.robot)?;
+            let map = self.map(map)?;
+            scan.check_alignment()?;
+            scan.check_points(self.limits())?;
+            let inner = Arc::clone(&self.inner);
+            let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);
+            let align = move |stop: StopSignal<'_>| {
+                limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
+            };
+            self.inner.pools.alignment.run(align).await?
+        };
+        self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
+    }
+}

@@ -1,0 +1,5 @@
+//! Tests of the service as a whole.
+
+mod looks;
+#[cfg(feature = "shuttle")]
+mod modeled;

@@ -1,0 +1,97 @@
+//! How long one request may take of the threads for work that uses the CPU.
+
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use crate::error::{Reason, ServiceError};
+use mrol_map::util::StopSignal;
+
+/// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
+/// deadline bounds. A clone is the same limit of the same request.
+#[derive(Debug, Clone)]
+pub(crate) struct TimeLimit {
+    name: &'static str,
+    most: Duration,
+    ends: Arc<OnceLock<Instant>>,
+}
+
+impl TimeLimit {
+    /// The limit `name`, which is so many seconds.
+    pub(crate) fn new(name: &'static str, most_s: f64) -> Self {
+        Self { name, most: Duration::from_secs_f64(most_s), ends: Arc::default() }
+    }
+
+    /// Runs `job` under `stop` and this limit. An error of a job that was stopped in time names the limit.
+    pub(crate) fn run<T>(
+        &self,
+        stop: StopSignal<'_>,
+        job: impl FnOnce(StopSignal<'_>) -> Result<T, ServiceError>,
+    ) -> Result<T, ServiceError> {
+        job(stop.by(*self.ends.get_or_init(|| Instant::now() + self.most))).map_err(|error| self.named(error))
+    }
+
+    /// Waits for `turn`, for as long as is left.
+    ///
+    /// # Errors
+    /// The limit, once it is over.
+    pub(crate) async fn wait<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
+        let ends = *self.ends.get_or_init(|| Instant::now() + self.most);
+        let waited = tokio::time::timeout_at(ends.into(), turn).await;
+        waited.map_err(|_| self.named(ServiceError::new(Reason::TimeLimit, "")))
+    }
+
+    /// The error, and where it says that the time is up, which time.
+    pub(super) fn named(&self, error: ServiceError) -> ServiceError {
+        if error.reason != Reason::TimeLimit {
+            return error;
+        }
+        let message = format!("the request took longer than {} allows, which is {:?}", self.name, self.most);
+        ServiceError { message, ..error }
+    }
+}
+
+/// Ends work that nobody waits for, or that takes too long.
+///
+/// # Errors
+/// `caller_gone` when the caller has gone, who is therefore not told; `time_limit` when the time is up.
+pub(crate) fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
+    if stop.is_stopped() { Err(ended_early(stop)) } else { Ok(()) }
+}
+
+/// Why work ended that was stopped.
+pub(crate) fn ended_early(stop: StopSignal<'_>) -> ServiceError {
+    let (reason, message) = match stop.is_cancelled() {
+        true => (Reason::CallerGone, "nobody waits for the answer"),
+        false => (Reason::TimeLimit, "the request took too long"),
+    };
+    ServiceError::new(reason, message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_whose_time_is_up_is_told_which_limit_and_who_has_gone_is_not() {
+        let limit = TimeLimit::new("alignment_time_max", 0.0);
+        let error = limit.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
+        assert_eq!(error.reason, Reason::TimeLimit);
+        assert!(error.message.contains("alignment_time_max allows, which is 0ns"), "{}", error.message);
+        let gone = || true;
+        let error = limit.run(StopSignal::when(&gone), check_not_stopped).unwrap_err();
+        assert_eq!(error.reason, Reason::CallerGone);
+        let patient = TimeLimit::new("undo_time_max", 3600.0);
+        assert_eq!(patient.run(StopSignal::NEVER, |stop| check_not_stopped(stop).map(|()| 1)).unwrap(), 1);
+    }
+
+    #[test]
+    fn the_time_of_a_request_that_is_tried_again_goes_on() {
+        let limit = TimeLimit::new("undo_time_max", 3600.0);
+        let ends = |limit: &TimeLimit| {
+            limit.run(StopSignal::NEVER, |_| Ok(())).unwrap();
+            *limit.ends.get().unwrap()
+        };
+        let first = ends(&limit);
+        assert_eq!(ends(&limit.clone()), first);
+    }
+}
