@@ -108,6 +108,8 @@ const FOLDERS: [&str; 8] = [".ci", "clients", "crates", "docker", "examples", "p
 fn named_paths(text: &str) -> Vec<&str> {
     let is_of_path = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
     let words = text.split(|c: char| !is_of_path(c)).map(|word| word.trim_end_matches(['.', '/']));
+    // Links of pages in folders of `docs` begin at the page.
+    let words = words.map(|word| word.trim_start_matches("../"));
     let is_named = |word: &&str| {
         word.split_once('/').is_some_and(|(first, rest)| FOLDERS.contains(&first) && !rest.is_empty())
     };
@@ -117,7 +119,7 @@ fn named_paths(text: &str) -> Vec<&str> {
 #[test]
 fn paths_are_found_in_sentences() {
     let text = "In `src/lib.rs` and ([it](../../tests/a-b/main.rs)), crates/map/src/align/. Not in src/, a/src/b or x.";
-    assert_eq!(named_paths(text), ["src/lib.rs", "crates/map/src/align"]);
+    assert_eq!(named_paths(text), ["src/lib.rs", "tests/a-b/main.rs", "crates/map/src/align"]);
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! The frames of map files and journals, made by the description of their bytes alone (`src/store/snapshot.rs`,
-//! `src/store/journal/segment.rs` and `frame.rs`): what is inside them reaches the decoders with right checksums.
+//! The frames of map files and journals, made by the description of their bytes alone (`crates/store/src/snapshot`,
+//! `crates/store/src/journal/segment.rs` and `frame.rs`): what is inside them reaches the decoders with right checksums.
 
 use uuid::Uuid;
 
