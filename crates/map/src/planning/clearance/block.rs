@@ -5,9 +5,9 @@ use crate::voxel::BlockMask;
 /// Bytes of a block: one a cell, x fastest.
 pub(super) const BLOCK_BYTES: usize = 512;
 /// Bytes of 4 x 4 x 4 cells, see [`cell_place`]; x fastest.
-pub(in crate::planning) const LINE_BYTES: usize = 64;
+pub(super) const LINE_BYTES: usize = 64;
 /// Four times the squared distance where it is that or more.
-pub(in crate::planning) const FAR: u8 = u8::MAX;
+pub(super) const FAR: u8 = u8::MAX;
 /// Cells along the three blocks that a row goes through.
 const WINDOW: usize = 24;
 /// Steps between a cell and the cubes that are looked at: eight either way.

@@ -13,7 +13,7 @@ const UNMADE: u16 = u16::MAX;
 
 /// The blocks of a cluster that were made.
 #[derive(Debug)]
-pub(in crate::planning) struct FieldCluster {
+pub(super) struct FieldCluster {
     /// The number of each block of the cluster, x fastest.
     numbers: [u16; BLOCKS],
     /// The first is that with nothing near.
@@ -35,14 +35,14 @@ impl FieldCluster {
 
     /// The byte of a cell of a block, both by their places; none where the block is not made.
     #[inline(always)]
-    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<&u8> {
+    pub(super) fn byte(&self, block: u32, cell: u32) -> Option<&u8> {
         let number = self.numbers[block as usize % BLOCKS];
         self.blocks.get(usize::from(number)).map(|block| &block.0[cell as usize % BLOCK_BYTES])
     }
 
     /// The bytes of a line, by the places of its block and of a cell in it; none where the block is not made.
     #[inline(always)]
-    pub(in crate::planning) fn line(&self, block: u32, cell: u32) -> Option<&[u8; LINE_BYTES]> {
+    pub(super) fn line(&self, block: u32, cell: u32) -> Option<&[u8; LINE_BYTES]> {
         let number = self.numbers[block as usize % BLOCKS];
         let lines = self.blocks.get(usize::from(number))?.0.as_chunks().0;
         lines.get(cell as usize / LINE_BYTES)

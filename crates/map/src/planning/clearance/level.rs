@@ -48,25 +48,25 @@ impl FieldLevel {
 
     /// The key of the cluster of the cell at `index`.
     #[inline(always)]
-    pub(in crate::planning) fn cluster_key(index: [i32; 3]) -> u64 {
+    pub(super) fn cluster_key(index: [i32; 3]) -> u64 {
         VoxelKey::pack(index.map(|i| i >> (BLOCK_LEVELS + CLUSTER_LEVELS))).to_bits()
     }
 
     /// The place of its block in the cluster.
     #[inline(always)]
-    pub(in crate::planning) fn block_place(index: [i32; 3]) -> u32 {
+    pub(super) fn block_place(index: [i32; 3]) -> u32 {
         place(index.map(|i| i >> BLOCK_LEVELS))
     }
 
     /// Its place in the block.
     #[inline(always)]
-    pub(in crate::planning) fn cell_place(index: [i32; 3]) -> u32 {
+    pub(super) fn cell_place(index: [i32; 3]) -> u32 {
         cell_place(index)
     }
 
     /// The cluster with a key, where there is one.
     #[inline(always)]
-    pub(in crate::planning) fn cluster(&self, key: u64) -> Option<&FieldCluster> {
+    pub(super) fn cluster(&self, key: u64) -> Option<&FieldCluster> {
         let mask = self.slots.len() - 1;
         let mut at = Self::hash(key) & mask;
         loop {
@@ -87,7 +87,7 @@ impl FieldLevel {
     }
 
     /// The obstacles in a block, as they were when it was made; none where it is not made.
-    pub(in crate::planning) fn obstacles(&self, block: VoxelKey) -> Option<BlockMask> {
+    pub(super) fn obstacles(&self, block: VoxelKey) -> Option<BlockMask> {
         self.cluster(block.ancestor(CLUSTER_LEVELS).to_bits())?.obstacles(FieldCluster::place(block))
     }
 

@@ -12,7 +12,8 @@ use crate::util::StopSignal;
 /// Which cells of a grid have occupied voxels of a level in a band of height, and how high these reach.
 ///
 /// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each
-/// voxel lies in one cell. Voxels of the band are those whose centers lie in it, as those of a [`Region`] are.
+/// voxel lies in one cell. Voxels of the band are those whose centers lie in it, as those of a
+/// [`Region`](crate::map::Region) are.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
 /// too; they have no top, and make no grid larger that is as large as what is there.

@@ -43,7 +43,7 @@ impl<'a> Shapes<'a> {
     }
 
     /// True without a keep-out.
-    pub(in crate::planning) fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
