@@ -71,7 +71,8 @@ const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 
 const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
 /// Most sessions of robots whose forgotten scans a file may list.
 const SESSIONS_MAX: usize = 1 << 20;
-/// Bytes of memory of a session with forgotten scans, without the ids: its name, the robot's, and their entries by name.
+/// Bytes of memory of a session with forgotten scans, without the ids: its name, the robot's, and their entries by
+/// name.
 const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
 /// Bytes of memory of a voxel's moments: its key twice, and the moments with and without their key.
