@@ -1,5 +1,5 @@
-//! A handle on the service: its maps, and the caller on whose behalf they are named. Its operations are `impl MapService`
-//! blocks in the rooms of their kind.
+//! A handle on the service: its maps, and the caller on whose behalf they are named. Its operations are
+//! `impl MapService` blocks in the rooms of their kind.
 
 use std::sync::Arc;
 
@@ -62,8 +62,8 @@ impl MapService {
         })
     }
 
-    /// The same maps for a caller of a name, who may name no others than those of `allowed_maps`, and send and undo no others than
-    /// the scans of `scans`.
+    /// The same maps for a caller of a name, who may name no others than those of `allowed_maps`, and send and undo no
+    /// others than the scans of `scans`.
     pub fn limited_to(
         &self,
         caller: Option<CallerName>,
@@ -130,8 +130,8 @@ impl MapService {
         self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
     }
 
-    /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares it
-    /// again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it.
+    /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares
+    /// it again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it.
     pub(super) async fn submit_and_wait<A: Send + 'static>(
         &self,
         pool: &Pool,

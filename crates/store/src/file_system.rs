@@ -9,7 +9,7 @@ use super::mode::StoreMode;
 use mrol_map::util::StopSignal;
 
 /// Bytes that are read between two checks of the stop signal: some ten milliseconds of a slow disk.
-const BYTES_PER_LOOK: u64 = 4 << 20;
+const BYTES_PER_STOP_CHECK: u64 = 4 << 20;
 
 /// The file operations that maps are kept with.
 ///
@@ -162,7 +162,7 @@ impl FileSystem for Disk {
         let mut file = File::open(file)?;
         let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
         while !stop.is_stopped() {
-            if Read::by_ref(&mut file).take(BYTES_PER_LOOK).read_to_end(&mut bytes)? == 0 {
+            if Read::by_ref(&mut file).take(BYTES_PER_STOP_CHECK).read_to_end(&mut bytes)? == 0 {
                 return Ok(Some(bytes));
             }
         }

@@ -8,9 +8,9 @@
 //! done                   maps/office-replaced-41.OLD/          maps/office.NEW/
 //! ```
 //!
-//! The file `replaces` names the folder of the old map, and the new name of that folder, which may be that of one that is set
-//! aside. While it exists, the next
-//! start completes what a crash interrupted, so that there is one map of the name at every moment.
+//! The file `replaces` names the folder of the old map, and the new name of that folder, which may be that of one that
+//! is set aside. While it exists, the next start completes what a crash interrupted, so that there is one map of the
+//! name at every moment.
 
 use std::path::Path;
 

@@ -40,8 +40,8 @@ impl AllowedScans {
     /// Asks whether `target` may be undone.
     ///
     /// # Errors
-    /// `PermissionDenied` with `robot_not_allowed` for scans of other robots, with `scope_too_small` where a caller that
-    /// may send scans alone names a revision.
+    /// `PermissionDenied` with `robot_not_allowed` for scans of other robots, with `scope_too_small` where a caller
+    /// that may send scans alone names a revision.
     pub fn permit_undo(&self, target: &UndoTarget) -> Result<(), ServiceError> {
         match (target, &self.robots) {
             (UndoTarget::Scan { robot, .. } | UndoTarget::RobotSince { robot, .. }, _) => self.permit(robot),

@@ -5,8 +5,8 @@ use sha2::{Digest as _, Sha256};
 use mrol_map::geometry::{rotation_xyzw, translation_m};
 use mrol_map::map::Region;
 
-/// The beginning of the SHA-256 hash of what was asked for. A checksum would not do: with one it takes a few equations to
-/// make a request that another is then mistaken for. Every field has its length before it.
+/// The beginning of the SHA-256 hash of what was asked for. A checksum would not do: with one it takes a few equations
+/// to make a request that another is then mistaken for. Every field has its length before it.
 #[derive(Debug, Clone)]
 pub(super) struct Digest(Sha256);
 

@@ -13,9 +13,9 @@ use mrol_map::map::{KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepO
 use mrol_map::util::StopSignal;
 
 impl MapService {
-    /// Ends the keep-outs of all maps whose time is up at `now_ns`, nanoseconds since the Unix epoch; how many ended. To be
-    /// called at start, and every second or so. A map whose disk hangs keeps this call waiting, and no other: until it
-    /// is over, later calls leave that map out.
+    /// Ends the keep-outs of all maps whose time is up at `now_ns`, nanoseconds since the Unix epoch; how many ended.
+    /// To be called at start, and every second or so. A map whose disk hangs keeps this call waiting, and no other:
+    /// until it is over, later calls leave that map out.
     pub async fn expire_keep_outs(&self, now_ns: i64) -> usize {
         let mut ended = 0;
         let due = self.inner.catalog.all().into_iter().filter(|map| map.has_expired(now_ns));
@@ -31,15 +31,15 @@ impl MapService {
 }
 
 impl HostedMap {
-    /// True of a map that takes changes and has a keep-out whose time is up. Where keep-outs change just now, the next call
-    /// sees them.
+    /// True of a map that takes changes and has a keep-out whose time is up. Where keep-outs change just now, the next
+    /// call sees them.
     fn has_expired(&self, now_ns: i64) -> bool {
         let has_one = |keep_outs: Arc<KeepOuts>| keep_outs.expired(now_ns).next().is_some();
         self.commit_queue.stopped().is_none() && self.map.try_keep_outs().is_some_and(has_one)
     }
 
-    /// Ends the keep-outs whose time is up; how many ended. One that cannot be ended is left for the next call, and that is
-    /// logged once.
+    /// Ends the keep-outs whose time is up; how many ended. One that cannot be ended is left for the next call, and
+    /// that is logged once.
     async fn expire_keep_outs(self: Arc<Self>, now_ns: i64, budget: &ResourceBudget) -> usize {
         let Ok(_attempt) = self.keep_out_expiry.lock.try_lock() else { return 0 };
         let Some(keep_outs) = self.map.try_keep_outs() else { return 0 };

@@ -16,8 +16,8 @@ use mrol_store::MapFolder;
 const UNSEEN: &str = "a deletion of what was not seen";
 /// How far behind a voxel a scan has to have seen, in finest voxels: noise puts surfaces two voxels off.
 const MARGIN_VOXELS: f32 = 3.0;
-/// Blocks that are looked at between two looks at the stop signal.
-const BLOCKS_PER_LOOK: usize = 64;
+/// Blocks that are looked at between two checks of the stop signal.
+const BLOCKS_PER_STOP_CHECK: usize = 64;
 
 /// The voxels of a region that scans since a revision saw through and did not touch, as far as the journal was read.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ impl HostedMap {
         let lattice = self.map.lattice();
         let voxel_m = lattice.resolution_m(0) as f32;
         let least = WellBeyond { margin_m: MARGIN_VOXELS * voxel_m, gap_max_m: voxel_m };
-        let seen_through = stop.paced(there.blocks(), BLOCKS_PER_LOOK).map(|(block, mask)| {
+        let seen_through = stop.paced(there.blocks(), BLOCKS_PER_STOP_CHECK).map(|(block, mask)| {
             let mut seen_through = BlockMask::EMPTY;
             for cell in mask.cells(0) {
                 let center_m = lattice.center_m(cell.voxel(*block), 0);

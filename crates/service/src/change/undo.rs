@@ -32,7 +32,8 @@ struct PlannedUndo {
 }
 
 impl PlannedUndo {
-    /// The undo as it is now, while nobody else can change the map: what came since is little, and changes it by as much.
+    /// The undo as it is now, while nobody else can change the map: what came since is little, and changes it by as
+    /// much.
     fn decided(
         self,
         map: &HostedMap,
@@ -54,14 +55,15 @@ impl PlannedUndo {
 }
 
 impl MapService {
-    /// Takes scans or a deletion back: the map is then what all other changes make of it, with the deletions as they were. Of
-    /// the voxels that a scan touched, those that no other scan holds go; those that a deletion took out come back.
+    /// Takes scans or a deletion back: the map is then what all other changes make of it, with the deletions as they
+    /// were. Of the voxels that a scan touched, those that no other scan holds go; those that a deletion took out come
+    /// back.
     ///
     /// # Errors
-    /// `NotFound` without such a map, scan or revision; `FailedPrecondition` for a change from before what undo reaches, for
-    /// a revision that an undo made, or where maps are kept in memory only; `ResourceExhausted` while the disk is nearly
-    /// full, where there is no memory to find out in what the map would be, or none for what comes back; `DeadlineExceeded`
-    /// with `time_limit` beyond `undo_time_max`.
+    /// `NotFound` without such a map, scan or revision; `FailedPrecondition` for a change from before what undo
+    /// reaches, for a revision that an undo made, or where maps are kept in memory only; `ResourceExhausted` while the
+    /// disk is nearly full, where there is no memory to find out in what the map would be, or none for what comes back;
+    /// `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
     pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let work = async {
             self.scans.permit_undo(&undo.target)?;
@@ -90,8 +92,8 @@ impl HostedMap {
         Arc::clone(&self.undo_lock).lock_owned().await
     }
 
-    /// Waits, before an undo of all scans of a robot, until its earlier scans are done: those that come later wait in turn,
-    /// so that none that the undo does not know of lies before it.
+    /// Waits, before an undo of all scans of a robot, until its earlier scans are done: those that come later wait in
+    /// turn, so that none that the undo does not know of lies before it.
     pub(super) async fn lock_robot_of(&self, target: &UndoTarget) -> Option<OwnedMutexGuard<()>> {
         match target {
             UndoTarget::RobotSince { robot, .. } => Some(self.robots.lock_robot(robot).await),

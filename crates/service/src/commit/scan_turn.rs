@@ -33,9 +33,9 @@ impl ScanTurn<'_> {
         carves_less || leaves_none
     }
 
-    /// Cuts what a scan carves to what is there, and what no change since `carved_at` touched: another scan that saw something
-    /// there meanwhile is not contradicted. Of changes that are no longer kept nobody knows what they touched: then the scan
-    /// carves nothing.
+    /// Cuts what a scan carves to what is there, and what no change since `carved_at` touched: another scan that saw
+    /// something there meanwhile is not contradicted. Of changes that are no longer kept nobody knows what they
+    /// touched: then the scan carves nothing.
     fn cut_carving(&self, scan: &mut ScanRecord, carved_at: u64) -> bool {
         if scan.carved.is_empty() {
             return false;
@@ -58,8 +58,8 @@ impl ScanTurn<'_> {
         is_cut
     }
 
-    /// False where the viewpoint that the scan leaves makes more of them than the map may have: others came while it was prepared,
-    /// and those that it displaces are no longer enough.
+    /// False where the viewpoint that the scan leaves makes more of them than the map may have: others came while it
+    /// was prepared, and those that it displaces are no longer enough.
     fn has_room_for_viewpoint(&self, scan: &ScanRecord, bytes_max: usize) -> bool {
         if scan.viewpoint.is_none() {
             return true;

@@ -204,8 +204,8 @@ impl Worker {
         self.published.recent.tell_durable(durable);
     }
 
-    /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would
-    /// reach; that of others is thinned when undo reaches less far.
+    /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo
+    /// would reach; that of others is thinned when undo reaches less far.
     fn thin_in_memory(&mut self) {
         let revision = self.map.revision();
         if self.folder.is_none() && revision - self.thinned >= THINNED_EVERY {

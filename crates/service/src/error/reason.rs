@@ -26,8 +26,8 @@ struct Row {
     remedy: &'static str,
 }
 
-/// Makes [`Reason`] and its rows from one table: by code, a name, its word, who tells it, an HTTP status where the one of
-/// the code is not precise, the meaning, and what to do.
+/// Makes [`Reason`] and its rows from one table: by code, a name, its word, who tells it, an HTTP status where the one
+/// of the code is not precise, the meaning, and what to do.
 macro_rules! reasons {
     ($($code:ident {
         $($name:ident $word:literal $told_by:ident $($status:literal)?: $meaning:literal, $remedy:literal;)+

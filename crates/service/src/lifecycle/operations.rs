@@ -113,8 +113,8 @@ impl MapService {
     /// A map as a map file, at one revision.
     ///
     /// # Errors
-    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, there is no memory for it, or the file
-    /// would be larger than `map_file_bytes_max`, so that nobody could restore it.
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, there is no memory for it, or the
+    /// file would be larger than `map_file_bytes_max`, so that nobody could restore it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let work = async {
             let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
@@ -131,10 +131,10 @@ impl MapService {
     /// if there is one, which is kept as `NAME-replaced-REVISION` until somebody deletes it.
     ///
     /// # Errors
-    /// `InvalidArgument` for a file that is none, or damaged; `Conflict` where there is a map of that name, unless `replace`
-    /// says that it is to be kept under another; `ResourceExhausted` beyond `map_file_bytes_max`, `maps_max`,
-    /// `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk or memory is
-    /// nearly full.
+    /// `InvalidArgument` for a file that is none, or damaged; `Conflict` where there is a map of that name, unless
+    /// `replace` says that it is to be kept under another; `ResourceExhausted` beyond `map_file_bytes_max`, `maps_max`,
+    /// `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk or
+    /// memory is nearly full.
     pub async fn restore_map(
         &self,
         name: MapName,

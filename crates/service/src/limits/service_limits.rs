@@ -6,8 +6,8 @@ use mrol_map::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 use mrol_map::mapping::VIEWPOINT_BYTES_MAX_DEFAULT;
 use mrol_map::planning::FIELD_BYTES_MAX_DEFAULT;
 
-/// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
-/// in the error of a request beyond it, and is a setting of the section `limits`.
+/// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is
+/// named in the error of a request beyond it, and is a setting of the section `limits`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
@@ -17,8 +17,8 @@ pub struct Limits {
     /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
     pub connections_max: usize,
     /// Connections of each protocol besides, where all of those are in use: for one health check each, and for
-    /// `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives way, or one of the peer that
-    /// has most. 128.
+    /// `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives way, or one of the
+    /// peer that has most. 128.
     pub connections_reserved: usize,
     /// Seconds until a connection has to be secure and to begin to speak. 10.
     pub connection_opening_max_s: f64,
@@ -30,8 +30,8 @@ pub struct Limits {
     pub requests_max: usize,
     /// Calls whose client streams messages. 256.
     pub streams_max: usize,
-    /// Bytes of bodies that have arrived, of what streams keep of them, and of answers, listings and files that are being
-    /// sent. 1 GiB.
+    /// Bytes of bodies that have arrived, of what streams keep of them, and of answers, listings and files that are
+    /// being sent. 1 GiB.
     pub body_bytes_max: usize,
     /// How long a body may be silent before its end. 30 s.
     pub body_silence_max_s: f64,
@@ -43,8 +43,8 @@ pub struct Limits {
     pub caller_requests_per_s_max: u32,
     /// As many may come at once. 100.
     pub caller_burst_max: u32,
-    /// Requests and streams in work at a time of one key that says nothing of that itself; 0 = any number. Less than half of
-    /// `requests_max`, so that no key keeps the others out. 192.
+    /// Requests and streams in work at a time of one key that says nothing of that itself; 0 = any number. Less than
+    /// half of `requests_max`, so that no key keeps the others out. 192.
     pub caller_requests_at_once_max: u32,
     /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are taken,
     /// the oldest gives way. 64.
@@ -67,7 +67,8 @@ pub struct Limits {
     pub watch_heartbeat_s: f64,
     /// How long a watch's client may take no message, until the watch ends. 30 s.
     pub watch_unread_max_s: f64,
-    /// Events that a map keeps in memory: what became of the last scans, and of the last of each of as many robots. 256.
+    /// Events that a map keeps in memory: what became of the last scans, and of the last of each of as many robots.
+    /// 256.
     pub events_per_map_max: usize,
     /// Points of one query, deletion or scan, or rays of one question. 2,000,000.
     pub points_per_request_max: usize,
@@ -81,13 +82,13 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
-    /// Links, spheres and points, in all, of a body that is checked, and spheres of a group that is checked as one. A body has
-    /// 65,536 links at most, whatever this is. 16,384.
+    /// Links, spheres and points, in all, of a body that is checked, and spheres of a group that is checked as one. A
+    /// body has 65,536 links at most, whatever this is. 16,384.
     pub body_parts_max: usize,
     /// Regions in which a check ignores voxels. A message has 4,096 at most, whatever this is. 64.
     pub ignored_regions_max: usize,
-    /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part goes.
-    /// 128 MiB.
+    /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part
+    /// goes. 128 MiB.
     pub planning_field_bytes_max: usize,
     /// How long a question of a planner may take, while changes of the map wait for it. 0.5 s.
     pub question_time_max_s: f64,
@@ -109,12 +110,13 @@ pub struct Limits {
     pub trajectory_page_max: usize,
     /// Keep-outs of one map. 256, which is also the most.
     pub keep_outs_max: usize,
-    /// Comparisons of points with the sides of keep-outs in one query: points times corners, a shape without corners counting as
-    /// one. 400,000,000, some seconds.
+    /// Comparisons of points with the sides of keep-outs in one query: points times corners, a shape without corners
+    /// counting as one. 400,000,000, some seconds.
     pub keep_out_tests_max: usize,
     /// Corners of a keep-out that is a prism. 64, which is also the most.
     pub keep_out_corners_max: usize,
-    /// Bytes of memory of a map's viewpoints, by which it knows what is free. Where it is full, those that add least go. 64 MiB.
+    /// Bytes of memory of a map's viewpoints, by which it knows what is free. Where it is full, those that add least
+    /// go. 64 MiB.
     pub viewpoint_bytes_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
     pub robots_per_map_max: usize,
@@ -147,8 +149,8 @@ pub struct Limits {
     pub disk_free_low_mib: u64,
     /// MiB free from which on they are taken again. 512.
     pub disk_free_resume_mib: u64,
-    /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control group
-    /// allows. 0.
+    /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control
+    /// group allows. 0.
     pub memory_high_mib: u64,
     /// MiB at which it is taken again; 0 = 94 % of the high mark. 0.
     pub memory_resume_mib: u64,

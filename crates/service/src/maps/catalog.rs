@@ -168,8 +168,8 @@ impl Catalog {
         Err(ServiceError::new(Reason::TooManyMaps, message))
     }
 
-    /// Takes a map into the catalog, kept and named; the caller holds `writing`. It is built before it is kept: one that
-    /// the server cannot build is not found again at its next start.
+    /// Takes a map into the catalog, kept and named; the caller holds `writing`. It is built before it is kept: one
+    /// that the server cannot build is not found again at its next start.
     async fn add(
         &self,
         name: &MapName,

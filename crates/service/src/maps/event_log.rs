@@ -15,8 +15,8 @@ pub const EVENTS_MAX: usize = 4096;
 
 /// The last events of a map, and the last of each robot: a robot that fell silent is still there to be seen.
 ///
-/// Bounded by the number of events: for a new one, the oldest goes of the robot that has most, so that no robot crowds out
-/// the others. Points are kept of a robot's last scan alone.
+/// Bounded by the number of events: for a new one, the oldest goes of the robot that has most, so that no robot crowds
+/// out the others. Points are kept of a robot's last scan alone.
 #[derive(Debug)]
 pub(crate) struct EventLog {
     kept: Mutex<Kept>,
@@ -37,7 +37,8 @@ impl Default for EventLog {
 }
 
 impl EventLog {
-    /// Keeps an event as the newest one, and tells who watches. So many are kept at most, and of as many robots the last.
+    /// Keeps an event as the newest one, and tells who watches. So many are kept at most, and of as many robots the
+    /// last.
     pub(crate) fn note(&self, mut event: ScanEvent, most: usize) {
         event.time_ns = unix_time_ns();
         let micros = u64::try_from(event.time_ns / 1000).unwrap_or_default();

@@ -28,8 +28,8 @@ impl Followers {
         (Self { announced, recent, whole_states: FullStates::default() }, published)
     }
 
-    /// Waits until `revision` is there; false where `wait_max` is over first, or the map ends, of which who waits hears at
-    /// once.
+    /// Waits until `revision` is there; false where `wait_max` is over first, or the map ends, of which who waits hears
+    /// at once.
     pub(super) async fn wait_for_revision(
         &self,
         revision: u64,

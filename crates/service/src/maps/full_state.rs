@@ -8,7 +8,8 @@ use mrol_map::sync::{Mutex, Rank};
 use mrol_map::visibility::ViewpointSet;
 use mrol_map::voxel::VoxelSet;
 
-/// The voxels of a level, the keep-outs and the viewpoints at one revision. Those who begin to watch at about the same time share it.
+/// The voxels of a level, the keep-outs and the viewpoints at one revision. Those who begin to watch at about the same
+/// time share it.
 #[derive(Debug)]
 pub(crate) struct FullState {
     pub(crate) version: ContentVersion,

@@ -13,8 +13,8 @@ pub(super) struct Snapshots {
 }
 
 impl Snapshots {
-    /// There is no room for a snapshot: said once, tried again and again. Nothing is lost, since the journal is kept until
-    /// there is one.
+    /// There is no room for a snapshot: said once, tried again and again. Nothing is lost, since the journal is kept
+    /// until there is one.
     pub(super) fn put_off(&self, map: &MapName, why: &str) {
         if !self.is_put_off.swap(true, Ordering::Relaxed) {
             tracing::warn!(%map, why, "a snapshot is put off: the journal grows instead");

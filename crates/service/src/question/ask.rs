@@ -15,13 +15,13 @@ use crate::work::TimeLimit;
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
-/// A question that is answered in about so long, nanoseconds, is answered where it arrives: handing it over takes two changes of
-/// thread, some 70 us, and as many times as long as threads wait for a core.
+/// A question that is answered in about so long, nanoseconds, is answered where it arrives: handing it over takes two
+/// changes of thread, some 70 us, and as many times as long as threads wait for a core.
 const INLINE_NS: usize = 500_000;
 /// How long that may take before the question is handed over after all.
 const INLINE_TIME_MAX: Duration = Duration::from_millis(1);
-/// Bytes that such a question takes at most: so little, once for each thread of the runtime, is not worth a look at the files in
-/// which the system says how much memory there is.
+/// Bytes that such a question takes at most: so little, once for each thread of the runtime, is not worth a look at the
+/// files in which the system says how much memory there is.
 const INLINE_BYTES: usize = 2 << 20;
 
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
@@ -34,9 +34,9 @@ impl MapService {
     /// Answers a question of a planner at one revision: a small one where it arrives, others on a thread for planners.
     ///
     /// # Errors
-    /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when `min_revision`
-    /// does not come; `FailedPrecondition` when the map has another uuid; `ResourceExhausted` where there is no memory for
-    /// the answer, or too many jobs wait.
+    /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when
+    /// `min_revision` does not come; `FailedPrecondition` when the map has another uuid; `ResourceExhausted` where
+    /// there is no memory for the answer, or too many jobs wait.
     pub async fn ask<Q: Question>(
         &self,
         map: &MapName,
@@ -67,7 +67,8 @@ impl MapService {
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
 
-    /// A question within the limits: one that is neither small nor has a small answer is looked through on a thread for planners.
+    /// A question within the limits: one that is neither small nor has a small answer is looked through on a thread for
+    /// planners.
     async fn checked<Q: Question>(&self, question: Q) -> Result<Q, ServiceError> {
         if question.work_ns() <= INLINE_NS || question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
             return question.check(self.limits()).map(|()| question);
@@ -79,7 +80,8 @@ impl MapService {
 }
 
 impl Inner {
-    /// The answer to a small question, where nothing has to be waited for and nobody waits for a thread; none elsewhere.
+    /// The answer to a small question, where nothing has to be waited for and nobody waits for a thread; none
+    /// elsewhere.
     fn answer_at_once<Q: Question>(
         &self,
         map: &HostedMap,

@@ -32,7 +32,8 @@ pub struct FrontierQuestion {
 
 /// Frontiers that are told where nobody says.
 pub const FRONTIERS_MAX_DEFAULT: usize = 100;
-/// Bytes of a voxel of the box while frontiers are looked for: bits of what is known, and the places of frontier voxels.
+/// Bytes of a voxel of the box while frontiers are looked for: bits of what is known, and the places of frontier
+/// voxels.
 const WORK_BYTES_EACH: usize = 5;
 
 impl FrontierQuestion {

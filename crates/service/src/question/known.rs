@@ -6,8 +6,9 @@ use mrol_map::voxel::Lattice;
 
 /// The part of a map that is known at a level.
 ///
-/// A voxel of the level is known where the centers of all finest voxels in it lie in the region, and the region is convex. So a
-/// ball is known whose distance from the region's border is a voxel's diagonal: it meets no voxel that is not.
+/// A voxel of the level is known where the centers of all finest voxels in it lie in the region, and the region is
+/// convex. So a ball is known whose distance from the region's border is a voxel's diagonal: it meets no voxel that is
+/// not.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownPart {
     region: Region,

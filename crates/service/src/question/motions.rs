@@ -37,8 +37,8 @@ pub struct MotionCheck {
 
 /// Bytes of a motion in an answer: a share, a clearance, and a bit.
 const BYTES_EACH: usize = 9;
-/// How long a part of the body takes at the ends of a motion and between them, for each configuration, nanoseconds: where it
-/// moves some ten voxels.
+/// How long a part of the body takes at the ends of a motion and between them, for each configuration, nanoseconds:
+/// where it moves some ten voxels.
 const NS_EACH: usize = 30;
 
 impl Question for MotionCheck {

@@ -41,8 +41,8 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// The answer from one view of `map`, with the version that it is of.
     ///
     /// # Errors
-    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was; that the
-    /// time is up, where `map` must not be waited for and would have to be.
+    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was;
+    /// that the time is up, where `map` must not be waited for and would have to be.
     fn answer_from(
         &self,
         map: &QuestionedMap<'_>,

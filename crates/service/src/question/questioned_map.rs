@@ -78,8 +78,9 @@ impl<'a> QuestionedMap<'a> {
         }
     }
 
-    /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
-    /// are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for this one.
+    /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`,
+    /// changes are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for
+    /// this one.
     pub(super) fn in_view<A>(
         &self,
         asked: &Asked,

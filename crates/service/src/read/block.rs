@@ -21,8 +21,8 @@ use mrol_map::voxel::{Lattice, VoxelSet};
 const BLOCK: &str = "a block";
 
 impl MapService {
-    /// A part of a level as masks of 8 x 8 x 8 voxels, or the distance of each of its cells from what is occupied, at one
-    /// revision.
+    /// A part of a level as masks of 8 x 8 x 8 voxels, or the distance of each of its cells from what is occupied, at
+    /// one revision.
     ///
     /// # Errors
     /// `InvalidArgument` for a level that is none, a dense block that is no box of finite sides, a cap that is none;
@@ -51,8 +51,8 @@ struct DenseBlock {
 }
 
 impl BlockRequest {
-    /// The answer of `map`, whose uuid is `map_uuid`; the level is one of its own. What `reserve` gives for the bytes of memory
-    /// that it takes is held until it is made.
+    /// The answer of `map`, whose uuid is `map_uuid`; the level is one of its own. What `reserve` gives for the bytes
+    /// of memory that it takes is held until it is made.
     ///
     /// # Errors
     /// See [`MapService::get_block`].

@@ -14,8 +14,8 @@ impl MapService {
     /// The occupied voxels of a level that are asked for, or their number, all at one revision.
     ///
     /// # Errors
-    /// `InvalidArgument` for a level that is none; `ResourceExhausted` when more than `listed_voxels_max` are to be listed;
-    /// `NotFound`.
+    /// `InvalidArgument` for a level that is none; `ResourceExhausted` when more than `listed_voxels_max` are to be
+    /// listed; `NotFound`.
     pub async fn list_voxels(
         &self,
         map: &MapName,
@@ -75,8 +75,8 @@ impl HostedMap {
         Ok(VoxelListing { resolution_m, voxels_total, keys, version: self.version(version) })
     }
 
-    /// The number of voxels that are asked for. Those of keep-outs are found out as for a listing, which gives its locks back
-    /// before it looks at shapes: at most `most` are counted then.
+    /// The number of voxels that are asked for. Those of keep-outs are found out as for a listing, which gives its
+    /// locks back before it looks at shapes: at most `most` are counted then.
     pub(crate) fn count(
         &self,
         request: &ListingRequest,

@@ -1,7 +1,7 @@
 //! Which scans touched a voxel.
 //!
-//! The journal knows. It is read backwards, segment by segment, so that the newest scans are found first and no more is read
-//! than is needed, nor held than one segment.
+//! The journal knows. It is read backwards, segment by segment, so that the newest scans are found first and no more is
+//! read than is needed, nor held than one segment.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -25,13 +25,13 @@ use mrol_store::{JournalPart, MapFolder, StoreError, VoxelMention};
 const OBSERVERS: &str = "a list of observers";
 
 impl MapService {
-    /// The scans that touched a voxel and were not undone, newest first, as far back as the journal reaches: some of them
-    /// where that takes longer than `observers_time_max_s`.
+    /// The scans that touched a voxel and were not undone, newest first, as far back as the journal reaches: some of
+    /// them where that takes longer than `observers_time_max_s`.
     ///
     /// # Errors
     /// `InvalidArgument` for a level that is none, a point in no voxel, a key out of the level's range;
-    /// `FailedPrecondition` where maps are kept in memory only; `ResourceExhausted` where there is no memory for a segment of
-    /// the journal; `NotFound`.
+    /// `FailedPrecondition` where maps are kept in memory only; `ResourceExhausted` where there is no memory for a
+    /// segment of the journal; `NotFound`.
     pub async fn list_observers(
         &self,
         map: &MapName,

@@ -17,15 +17,15 @@ use mrol_map::map::{ContentVersion, LongRead, MapName, MapView};
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::Lattice;
 
-/// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
-/// over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a machine of
-/// now allows.
+/// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing
+/// them over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a
+/// machine of now allows.
 const INLINE_POINTS: usize = 10_240;
 /// Sides of keep-outs that points are compared with where they arrive, less than a millisecond; see
 /// [`INLINE_POINTS`].
 const INLINE_SIDES: usize = 1 << 17;
-/// Points that are looked up before it is asked whether somebody waits for the answer: a millisecond or less. A multiple
-/// of the bits in a word.
+/// Points that are looked up before it is asked whether somebody waits for the answer: a millisecond or less. A
+/// multiple of the bits in a word.
 const POINTS_PER_STEP: usize = 64 << 10;
 
 impl MapService {

@@ -30,8 +30,8 @@ pub enum DeletionTarget {
     NotSeenSince(NotSeenSince),
 }
 
-/// The voxels of a region that no scan touched after a revision, although a viewpoint after it saw through them: what was taken
-/// away.
+/// The voxels of a region that no scan touched after a revision, although a viewpoint after it saw through them: what
+/// was taken away.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NotSeenSince {
     /// The voxels whose centers lie inside.

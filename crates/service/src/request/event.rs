@@ -12,8 +12,8 @@ use mrol_map::map::{RobotName, SessionName};
 /// What became of a scan that was sent for insertion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanEvent {
-    /// Greater than that of every event of the map before it; where the clock was not set back, the time of the answer in
-    /// microseconds since the Unix epoch, so that numbers go on after a restart.
+    /// Greater than that of every event of the map before it; where the clock was not set back, the time of the answer
+    /// in microseconds since the Unix epoch, so that numbers go on after a restart.
     pub number: u64,
     /// When the scan was answered, nanoseconds since the Unix epoch.
     pub time_ns: i64,
@@ -27,10 +27,11 @@ pub struct ScanEvent {
     pub points: usize,
     /// From the whole request to its answer.
     pub duration: Duration,
-    /// The pose that its guess stood for (map_from_sensor); none of a request that failed, and of an answer that is given
-    /// again.
+    /// The pose that its guess stood for (map_from_sensor); none of a request that failed, and of an answer that is
+    /// given again.
     pub guess: Option<Pose>,
-    /// Of a robot's last scan, where it was refused: some of its points (sensor frame), so that people see what does not fit.
+    /// Of a robot's last scan, where it was refused: some of its points (sensor frame), so that people see what does
+    /// not fit.
     pub sample: Vec<Point>,
     /// What was answered.
     pub answer: Result<Box<ScanAnswer>, FailedScan>,

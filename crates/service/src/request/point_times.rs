@@ -56,8 +56,8 @@ impl PointTimes {
     /// Asks whether these are times of `points` points of a scan.
     ///
     /// # Errors
-    /// When there are more or less of them, one is not finite or farther from the timestamp than `most_s` seconds, or the
-    /// scan has no timestamp.
+    /// When there are more or less of them, one is not finite or farther from the timestamp than `most_s` seconds, or
+    /// the scan has no timestamp.
     pub(crate) fn check(
         &self,
         points: usize,

@@ -11,7 +11,7 @@ pub struct MapVersion {
     pub revision: u64,
     /// The uuid of this incarnation of the map.
     pub map_uuid: Uuid,
-    /// Hash of the finest voxels that the map holds in this state; none in an answer that is given again, of which the map
-    /// has moved on since.
+    /// Hash of the finest voxels that the map holds in this state; none in an answer that is given again, of which the
+    /// map has moved on since.
     pub content_hash: Option<ContentHash>,
 }

@@ -19,7 +19,8 @@ pub struct WatchRequest {
     pub region: Option<Region>,
     /// In which form changes are told.
     pub form: WatchForm,
-    /// True to be told of viewpoints: where scans saw through. Of a region those that may have looked into it, and some more.
+    /// True to be told of viewpoints: where scans saw through. Of a region those that may have looked into it, and some
+    /// more.
     pub viewpoints: bool,
 }
 
@@ -122,11 +123,11 @@ pub struct ChangePart {
     pub content_hash: Option<ContentHash>,
     /// What made the change.
     pub cause: Cause,
-    /// Of changes: the finest voxels that a scan saw through, a deletion took out, or that went with an undo. Of deltas: the
-    /// voxels of the level that went.
+    /// Of changes: the finest voxels that a scan saw through, a deletion took out, or that went with an undo. Of
+    /// deltas: the voxels of the level that went.
     pub removed: BlockBytes,
-    /// Of changes: the finest voxels that a scan touched, new or not, or that an undo put back. Of deltas: the voxels of the
-    /// level that appeared.
+    /// Of changes: the finest voxels that a scan touched, new or not, or that an undo put back. Of deltas: the voxels
+    /// of the level that appeared.
     pub added: BlockBytes,
     /// The viewpoint that a scan left, where it was asked for: in the last part.
     pub viewpoint: Option<LeftViewpoint>,
@@ -174,9 +175,9 @@ impl From<MappedScan> for WatchedScan {
     }
 }
 
-/// Voxels as blocks of 8 x 8 x 8 of them, 72 bytes each: the packed key of the block (21 bits an axis, in units of blocks
-/// of the level), then its voxels as eight words of 64 bits, a bit a voxel in Morton order (bits z2 y2 x2 z1 y1 x1 z0 y0 x0
-/// of the position in the block). All numbers are little-endian.
+/// Voxels as blocks of 8 x 8 x 8 of them, 72 bytes each: the packed key of the block (21 bits an axis, in units of
+/// blocks of the level), then its voxels as eight words of 64 bits, a bit a voxel in Morton order (bits z2 y2 x2 z1 y1
+/// x1 z0 y0 x0 of the position in the block). All numbers are little-endian.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct BlockBytes(Bytes);
 

@@ -81,8 +81,8 @@ impl ResourceBudget {
         self.watermarks.check_to_grow().map(|()| reservation)
     }
 
-    /// Memory for a part of what is built bit by bit, and may be far too much. It is refused where a scan would be; others
-    /// do not notice.
+    /// Memory for a part of what is built bit by bit, and may be far too much. It is refused where a scan would be;
+    /// others do not notice.
     ///
     /// # Errors
     /// `ResourceExhausted` where there is no room for it below the mark.
@@ -93,7 +93,8 @@ impl ResourceBudget {
         shortage.map_or(Ok(reservation), |shortage| Err(shortage.refusal("")))
     }
 
-    /// Memory for a while, for `whom`. It may lie above the marks: what shrinks a map and what saves it needs some as well.
+    /// Memory for a while, for `whom`. It may lie above the marks: what shrinks a map and what saves it needs some as
+    /// well.
     ///
     /// # Errors
     /// `ResourceExhausted` where the process would have more than it may.

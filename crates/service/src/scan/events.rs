@@ -1,7 +1,7 @@
 //! What became of the scans that robots sent: the last events of a map, and each as it comes.
 //!
-//! Events are for people who look after robots. They are kept in memory, in bounded number, and a restart forgets them: what
-//! is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
+//! Events are for people who look after robots. They are kept in memory, in bounded number, and a restart forgets them:
+//! what is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -67,8 +67,8 @@ pub struct EventWatch {
 }
 
 impl EventWatch {
-    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where the
-    /// client took no message for `watch_unread_max_s`.
+    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled`
+    /// where the client took no message for `watch_unread_max_s`.
     pub fn into_stream(
         self,
         end: impl Future<Output = ServiceError> + Send + 'static,

@@ -1,7 +1,8 @@
 //! Scans of robots: inserted, aligned, located with no guess; the events and the trajectory that come of them.
 //!
-//! A scan comes in by `insert`, which waits for its robot's lock and for a thread; `submit` then filters it (`filtered`),
-//! locates it (`mapper`) and sets it on its way into the map. Where it is refused, `recovery` searches for its robot.
+//! A scan comes in by `insert`, which waits for its robot's lock and for a thread; `submit` then filters it
+//! (`filtered`), locates it (`mapper`) and sets it on its way into the map. Where it is refused, `recovery` searches
+//! for its robot.
 
 mod events;
 mod filtered;

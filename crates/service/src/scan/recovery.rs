@@ -1,7 +1,7 @@
 //! The search for lost robots, beside everything else that the server does.
 //!
-//! A robot that asked for it (see [`RobotSettings::recover`](crate::RobotSettings)) is searched for after a scan of it was
-//! refused: on a thread of its own that gives way to all others. The answer to the scan does not wait for it.
+//! A robot that asked for it (see [`RobotSettings::recover`](crate::RobotSettings)) is searched for after a scan of it
+//! was refused: on a thread of its own that gives way to all others. The answer to the scan does not wait for it.
 //! Whether the robot is where the search saw it, its next scan tells.
 
 use std::sync::Arc;

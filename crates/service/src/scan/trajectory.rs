@@ -88,8 +88,8 @@ impl TrajectoryPieces {
         self.trajectory.memory_bytes() + 3 * POSES_PER_PIECE * 1024
     }
 
-    /// The next piece; none after the last. The first is there even where it has no pose. Only the last one may say where
-    /// more than was asked for begins.
+    /// The next piece; none after the last. The first is there even where it has no pose. Only the last one may say
+    /// where more than was asked for begins.
     ///
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait. After an error comes no other piece.

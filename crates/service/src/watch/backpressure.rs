@@ -18,8 +18,8 @@ pub(crate) trait Teller: Send + 'static {
     fn tell(&mut self) -> impl Future<Output = Result<Self::Message, ServiceError>> + Send;
 }
 
-/// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where the
-/// client took no message for `unread_max_s`.
+/// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where
+/// the client took no message for `unread_max_s`.
 ///
 /// A message is made when there is room for it on the way: nothing piles up for who reads slowly.
 pub(crate) fn stream_of<T: Teller>(

@@ -183,8 +183,8 @@ impl Watch {
     /// The next message; it comes after `watch_heartbeat_s` at the latest, where the server is not busy.
     ///
     /// # Errors
-    /// `NotFound` or `FailedPrecondition` once the map is deleted or replaced; `ResourceExhausted` where there is no memory
-    /// for the whole state, or too many jobs wait. After an error comes no other message.
+    /// `NotFound` or `FailedPrecondition` once the map is deleted or replaced; `ResourceExhausted` where there is no
+    /// memory for the whole state, or too many jobs wait. After an error comes no other message.
     pub async fn next(&mut self) -> Result<WatchMessage, ServiceError> {
         loop {
             if let Some(event) = self.parts.next() {
@@ -205,8 +205,8 @@ impl Watch {
         }
     }
 
-    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where the
-    /// client took no message for `watch_unread_max_s`.
+    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled`
+    /// where the client took no message for `watch_unread_max_s`.
     pub fn into_stream(
         self,
         end: impl Future<Output = ServiceError> + Send + 'static,

@@ -7,8 +7,9 @@
 //!              of none, or of one out of reach     the whole state, then what came since
 //! ```
 //!
-//! A watcher is where it is: nothing waits for it, and nothing is kept for it. Its next message is made when there is room
-//! for it on the way to its client. Who falls behind the ring is told from the journal, and behind that of the whole state.
+//! A watcher is where it is: nothing waits for it, and nothing is kept for it. Its next message is made when there is
+//! room for it on the way to its client. Who falls behind the ring is told from the journal, and behind that of the
+//! whole state.
 
 mod backpressure;
 mod map_watch;

@@ -38,8 +38,8 @@ impl StateParts {
         Self { state, watched, lattice: *lattice, is_begun: false, next: Some(NextPart::Block(0)) }
     }
 
-    /// The blocks of the part that begins with `first`. Parts without a voxel in the region are passed over, but not so many that
-    /// it would keep a thread of the runtime.
+    /// The blocks of the part that begins with `first`. Parts without a voxel in the region are passed over, but not so
+    /// many that it would keep a thread of the runtime.
     fn take_blocks(&mut self, first: usize) -> BlockBytes {
         let all = self.state.voxels.blocks();
         for start in (first..).step_by(BLOCKS_PER_PART).take(PARTS_PASSED_OVER_MAX) {
@@ -60,8 +60,8 @@ impl StateParts {
         BlockBytes::default()
     }
 
-    /// The viewpoints of the part that begins with that of revision `first`: as many bytes as of blocks, and few that lie
-    /// elsewhere.
+    /// The viewpoints of the part that begins with that of revision `first`: as many bytes as of blocks, and few that
+    /// lie elsewhere.
     fn take_viewpoints(&mut self, first: u64) -> Vec<WatchedViewpoint> {
         let (mut told, mut bytes) = (Vec::new(), 0);
         self.next = None;

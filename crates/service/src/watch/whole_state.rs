@@ -15,8 +15,8 @@ const WATCH: &str = "a watch";
 pub(crate) const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
 
 impl HostedMap {
-    /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those who
-    /// watch a region share it with those who watch everything.
+    /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those
+    /// who watch a region share it with those who watch everything.
     pub(super) fn whole_state(
         &self,
         form: WatchForm,

@@ -2,8 +2,8 @@
 //!
 //! Callers take turns: a thread that comes free goes to the caller who has the fewest threads of those who wait, and of
 //! several such to the one whose last turn is longest ago. So who asks one question waits for about one question of
-//! somebody who asks many. Nobody waits forever: who has had a turn goes to the end of the row, and who comes anew joins it there.
-//! What one caller asks is begun in order.
+//! somebody who asks many. Nobody waits forever: who has had a turn goes to the end of the row, and who comes anew
+//! joins it there. What one caller asks is begun in order.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -249,8 +249,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever comes and goes, threads are neither lost nor made, none is free while somebody waits, and nobody waits for
-        /// more turns than there are others.
+        /// Whatever comes and goes, threads are neither lost nor made, none is free while somebody waits, and nobody
+        /// waits for more turns than there are others.
         #[test]
         fn nobody_waits_for_more_turns_than_there_are_others(
             threads in 1usize..4,

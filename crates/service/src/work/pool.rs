@@ -1,7 +1,7 @@
 //! Bounded threads for work that uses the CPU, away from the async runtime.
 //!
-//! Jobs wait in the futures of those who want their answers: whoever gives up takes the job along, with all that it holds
-//! in memory and its place among those that wait. A job in hand learns of it by its [`StopSignal`].
+//! Jobs wait in the futures of those who want their answers: whoever gives up takes the job along, with all that it
+//! holds in memory and its place among those that wait. A job in hand learns of it by its [`StopSignal`].
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::pin;

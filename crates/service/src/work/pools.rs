@@ -16,8 +16,8 @@ pub(crate) struct Pools {
     pub(crate) queries: Pool,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     pub(crate) mapping: Pool,
-    /// For scans that take long, since they do not fit from their guess: a second and more each, while robots whose scans
-    /// fit map on.
+    /// For scans that take long, since they do not fit from their guess: a second and more each, while robots whose
+    /// scans fit map on.
     pub(crate) long_mapping: Pool,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     pub(crate) alignment: Pool,
@@ -27,7 +27,8 @@ pub(crate) struct Pools {
     pub(crate) recovery: Pool,
     /// For finding out what an undo takes back, which reads a snapshot and the journal behind it.
     pub(crate) undo: Pool,
-    /// For map files, out of the server and in, which take seconds and much memory each: no query or scan waits for them.
+    /// For map files, out of the server and in, which take seconds and much memory each: no query or scan waits for
+    /// them.
     pub(crate) map_files: Pool,
     /// For what watches are told of besides the last changes: whole states, and changes that the journal has.
     pub(crate) watch: Pool,

@@ -125,7 +125,7 @@ impl From<(&RobotName, ForgottenIds<'_>)> for pb::ForgottenScans {
 }
 
 /// Robots whose ranges of ids are read between two checks of the stop signal.
-const ROBOTS_PER_LOOK: usize = 16;
+const ROBOTS_PER_STOP_CHECK: usize = 16;
 
 /// The trajectory together with the ids of scans whose poses are no longer kept.
 pub(crate) fn with_forgotten(
@@ -133,7 +133,7 @@ pub(crate) fn with_forgotten(
     forgotten: &[pb::ForgottenScans],
     stop: StopSignal<'_>,
 ) -> Result<Trajectory, Unreadable> {
-    for message in stop.paced(forgotten, ROBOTS_PER_LOOK) {
+    for message in stop.paced(forgotten, ROBOTS_PER_STOP_CHECK) {
         let pb::ForgottenScans { robot, session, id_gaps, last_revision, is_of_closed_sessions } = message;
         let robot = RobotName::new(robot).map_err(|e| e.to_string())?;
         let session = SessionName::new(session).map_err(|e| e.to_string())?;

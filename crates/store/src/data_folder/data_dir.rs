@@ -131,8 +131,8 @@ impl DataDir {
         Ok(folder)
     }
 
-    /// Creates a map in the place of one whose files are damaged, and sets the folder of that aside as it is; returns where
-    /// it lies then. Nobody uses the folder.
+    /// Creates a map in the place of one whose files are damaged, and sets the folder of that aside as it is; returns
+    /// where it lies then. Nobody uses the folder.
     ///
     /// # Errors
     /// When the system refuses. Where the new map is there already, the next start completes the exchange.

@@ -15,8 +15,8 @@
 //! disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions were
 //! accepted is part of the changes themselves, durable in the same record.
 //!
-//! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted goes
-//! into its own folder, and never into that of the next map of its name.
+//! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted
+//! goes into its own folder, and never into that of the next map of its name.
 
 mod contents;
 mod data_dir;

@@ -31,7 +31,8 @@ impl Replay {
     ) -> Result<(), StoreError> {
         let names = files.list(path).map_err(StoreError::io(path))?;
         let segments: Vec<u64> = names.iter().filter_map(|name| journal::first_revision(name)).collect();
-        // A kill between the cut of the journal and the end of the snapshots before it leaves these: the journal may begin beyond them.
+        // A kill between the cut of the journal and the end of the snapshots before it leaves these: the journal may
+        // begin beyond them.
         let mut expected = segments.first().map_or(0, |&first| first.min(self.map.revision() + 1));
         for (i, &first) in segments.iter().enumerate() {
             if first != expected {

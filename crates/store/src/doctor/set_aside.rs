@@ -28,8 +28,8 @@ pub struct SetAside {
     pub viewpoints: usize,
 }
 
-/// Makes a map of what can be read of one that cannot be opened, and sets the folder of that aside as it is. None where the
-/// map can be opened.
+/// Makes a map of what can be read of one that cannot be opened, and sets the folder of that aside as it is. None where
+/// the map can be opened.
 ///
 /// The map begins anew, with a uuid of its own: its history goes on otherwise than that which clients may have seen.
 ///

@@ -1,8 +1,8 @@
 //! The journal of a map: its changes in the order of their revisions, durable before they are visible.
 //!
 //! [`Journal`] is a narrow trait, so that a replicated log can take the place of [`SegmentedJournal`], which is files
-//! on this machine. Reading order: `log` is the trait, `record` a change as bytes, `frame` a record in a file, `segment`
-//! a file, `segmented` all files, `recovery` reads them after a crash.
+//! on this machine. Reading order: `log` is the trait, `record` a change as bytes, `frame` a record in a file,
+//! `segment` a file, `segmented` all files, `recovery` reads them after a crash.
 
 mod frame;
 mod inspection;

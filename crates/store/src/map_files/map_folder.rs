@@ -191,8 +191,8 @@ impl MapFolder {
         UndoWindow { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
     }
 
-    /// Removes snapshots and journal that are no longer needed, and the parts that only those named; `parts` are those of the
-    /// newest, whose lock the caller holds.
+    /// Removes snapshots and journal that are no longer needed, and the parts that only those named; `parts` are those
+    /// of the newest, whose lock the caller holds.
     fn forget(
         &self,
         window: UndoWindow,
@@ -215,8 +215,8 @@ impl MapFolder {
         self.forget_parts(parts)
     }
 
-    /// Removes the parts that no snapshot names; those of the newest snapshot are `parts`. What was removed of snapshots is
-    /// durable before: after a crash none is there that names a part which is not.
+    /// Removes the parts that no snapshot names; those of the newest snapshot are `parts`. What was removed of
+    /// snapshots is durable before: after a crash none is there that names a part which is not.
     fn forget_parts(&self, parts: &ViewpointParts) -> Result<(), StoreError> {
         let path = self.path.get();
         let unneeded = unneeded_parts(&*self.files, &path, parts.numbers())?;

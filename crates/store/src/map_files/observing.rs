@@ -39,9 +39,9 @@ pub enum NotObserved<E> {
 }
 
 impl MapFolder {
-    /// Reads what the map of `settings` holds without `targets`, scans and deletions by revision, up to the present head of
-    /// the journal.
-    /// `reserve` is called with the bytes of each part before it is built, when all parts before it exist.
+    /// Reads what the map of `settings` holds without `targets`, scans and deletions by revision, up to the present
+    /// head of the journal. `reserve` is called with the bytes of each part before it is built, when all parts before
+    /// it exist.
     ///
     /// The journal is read twice: for the voxels that the targets touched, so that nothing else need be remembered, and
     /// from the base on.

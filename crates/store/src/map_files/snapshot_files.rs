@@ -19,8 +19,8 @@ use crate::viewpoint_parts::{
 use mrol_map::map::REVISION_MAX;
 use mrol_map::util::StopSignal;
 
-/// Bytes that opening the map in `folder` will read: its newest snapshot, the parts of its viewpoints, and the journal from there
-/// on.
+/// Bytes that opening the map in `folder` will read: its newest snapshot, the parts of its viewpoints, and the journal
+/// from there on.
 pub(crate) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
     let names = files.list(folder).map_err(StoreError::io(folder))?;
     let newest = names.iter().filter_map(|name| snapshot_revision(name)).max().unwrap_or_default();
@@ -105,8 +105,8 @@ pub(crate) fn newest_good(
     Err(damaged.into_iter().next().map_or_else(none, |(_, error)| error))
 }
 
-/// Checks that every snapshot, segment and part of the viewpoints in `folder` belongs to the map, as far as it can be read; damage is found
-/// when the file is read. The snapshots of the revisions `read` were checked before.
+/// Checks that every snapshot, segment and part of the viewpoints in `folder` belongs to the map, as far as it can be
+/// read; damage is found when the file is read. The snapshots of the revisions `read` were checked before.
 ///
 /// # Errors
 /// `Foreign` for a file of another map.
@@ -189,8 +189,8 @@ impl Sizes {
     }
 }
 
-/// The parts in `folder` that no snapshot in it names, other than `kept`, by their numbers. Where a snapshot does not tell, its
-/// start being damaged, every part may be needed.
+/// The parts in `folder` that no snapshot in it names, other than `kept`, by their numbers. Where a snapshot does not
+/// tell, its start being damaged, every part may be needed.
 pub(super) fn unneeded_parts(
     files: &dyn FileSystem,
     folder: &Path,

@@ -7,7 +7,7 @@ use prost::Message;
 use uuid::Uuid;
 
 use super::fields::{
-    FIELDS_PER_LOOK, Fields, Value, bytes_of, count_bytes, count_varints, unzigzag, varints,
+    FIELDS_PER_STOP_CHECK, Fields, Value, bytes_of, count_bytes, count_varints, unzigzag, varints,
 };
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use super::snapshot::Snapshot;
@@ -56,9 +56,9 @@ pub(super) mod number {
 }
 
 /// Scans that are added to a trajectory between two checks of the stop signal: a few milliseconds.
-const SCANS_PER_LOOK: usize = 4096;
+const SCANS_PER_STOP_CHECK: usize = 4096;
 /// Robots whose forgotten scans are read between two checks of the stop signal, each with up to some thousand ranges.
-const ROBOTS_PER_LOOK: usize = 16;
+const ROBOTS_PER_STOP_CHECK: usize = 16;
 /// Most bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
 const RECORD_BYTES_MAX: usize = 4096;
 /// Bytes of memory of a number that is read into a growing list: the old and the new allocation.
@@ -71,7 +71,8 @@ const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 
 const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
 /// Most sessions of robots whose forgotten scans a file may list.
 const SESSIONS_MAX: usize = 1 << 20;
-/// Bytes of memory of a session with forgotten scans, without the ids: its name, the robot's, and their entries by name.
+/// Bytes of memory of a session with forgotten scans, without the ids: its name, the robot's, and their entries by
+/// name.
 const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
 /// Bytes of memory of a voxel's moments: its key twice, and the moments with and without their key.
@@ -127,7 +128,7 @@ impl<'a> Body<'a> {
             forgotten: Vec::new(),
             keep_outs: 0,
         };
-        for field in stop.paced(Fields::of(all), FIELDS_PER_LOOK) {
+        for field in stop.paced(Fields::of(all), FIELDS_PER_STOP_CHECK) {
             body.take(field?)?;
         }
         Ok(body)
@@ -303,13 +304,13 @@ impl<'a> Body<'a> {
             return Err("the revisions of its scans must ascend".to_owned().into());
         }
         let mut forgotten = Vec::with_capacity(self.forgotten.len());
-        for robot in self.stop.paced(&self.forgotten, ROBOTS_PER_LOOK) {
+        for robot in self.stop.paced(&self.forgotten, ROBOTS_PER_STOP_CHECK) {
             let ids = count_varints(robot, number::ID_GAPS, self.stop)?;
             memory.reserve(ids * NUMBER_BYTES + FORGOTTEN_BYTES)?;
             forgotten.push(decoded::<pb::ForgottenScans>(robot, "forgotten scans")?);
         }
         let trajectory = with_forgotten(Trajectory::default(), &forgotten, self.stop)?;
-        Ok(trajectory.with_poses(self.stop.paced(scans, SCANS_PER_LOOK), withdrawn))
+        Ok(trajectory.with_poses(self.stop.paced(scans, SCANS_PER_STOP_CHECK), withdrawn))
     }
 
     fn scans(&self) -> Result<Vec<MappedScan>, Unreadable> {
@@ -370,7 +371,7 @@ impl<'a> Body<'a> {
             Ok(_) => None,
             Err(unreadable) => Some(Err(unreadable)),
         };
-        self.stop.paced(Fields::of(self.all), FIELDS_PER_LOOK).filter_map(of_number)
+        self.stop.paced(Fields::of(self.all), FIELDS_PER_STOP_CHECK).filter_map(of_number)
     }
 }
 

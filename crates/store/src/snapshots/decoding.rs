@@ -83,8 +83,8 @@ impl Snapshot {
         }
     }
 
-    /// [`Snapshot::decode_until`] of a file that may lie in a map's folder: without the viewpoints that lie in parts, which it
-    /// names.
+    /// [`Snapshot::decode_until`] of a file that may lie in a map's folder: without the viewpoints that lie in parts,
+    /// which it names.
     pub(crate) fn decode_but_parts<E>(
         bytes: &[u8],
         limits: &MapFileLimits,

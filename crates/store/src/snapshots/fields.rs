@@ -5,9 +5,9 @@ use crate::codec::Unreadable;
 use mrol_map::util::StopSignal;
 
 /// Fields, or numbers, that are read between two checks of the stop signal: a millisecond or so.
-pub(super) const FIELDS_PER_LOOK: usize = 4096;
+pub(super) const FIELDS_PER_STOP_CHECK: usize = 4096;
 /// Bytes in which varints are counted between two checks of the stop signal.
-const BYTES_PER_LOOK: usize = 1 << 20;
+const BYTES_PER_STOP_CHECK: usize = 1 << 20;
 
 /// The value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,11 +77,11 @@ pub(super) fn varints<T>(
     stop: StopSignal<'_>,
 ) -> Result<Vec<T>, Unreadable> {
     let mut values = Vec::with_capacity(count);
-    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_STOP_CHECK) {
         match field? {
             (n, Value::Bytes(mut packed)) if n == number => {
                 while !packed.is_empty() && !stop.is_stopped() {
-                    for _ in 0..FIELDS_PER_LOOK {
+                    for _ in 0..FIELDS_PER_STOP_CHECK {
                         if packed.is_empty() {
                             break;
                         }
@@ -105,7 +105,7 @@ pub(super) fn bytes_of<'b>(
     stop: StopSignal<'_>,
 ) -> Result<&'b [u8], Unreadable> {
     let mut last = &[][..];
-    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_STOP_CHECK) {
         match field? {
             (n, Value::Bytes(bytes)) if n == number => last = bytes,
             (n, _) if n == number => return Err(format!("field {number} is of another kind")),
@@ -124,9 +124,11 @@ pub(super) fn unzigzag(zigzag: u64) -> i64 {
 pub(super) fn count_varints(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
     let ends = |packed: &[u8]| packed.iter().filter(|&&byte| byte < 128).count();
     let mut count = 0;
-    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_STOP_CHECK) {
         count += match field? {
-            (n, Value::Bytes(packed)) if n == number => stop.pieces(packed, BYTES_PER_LOOK).map(ends).sum(),
+            (n, Value::Bytes(packed)) if n == number => {
+                stop.pieces(packed, BYTES_PER_STOP_CHECK).map(ends).sum()
+            }
             (n, Value::Varint(_)) if n == number => 1,
             _ => 0,
         };
@@ -137,7 +139,7 @@ pub(super) fn count_varints(message: &[u8], number: u64, stop: StopSignal<'_>) -
 /// Counts the bytes of the field `number`, over all its occurrences.
 pub(super) fn count_bytes(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
     let mut count = 0;
-    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_STOP_CHECK) {
         if let (n, Value::Bytes(bytes)) = field?
             && n == number
         {

@@ -8,9 +8,9 @@ use mrol_map::util::StopSignal;
 
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
-/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
-/// version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and moments; up to
-/// version 7 there are no viewpoints.
+/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored;
+/// up to version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and
+/// moments; up to version 7 there are no viewpoints.
 pub const FORMAT_VERSION: u32 = 8;
 
 const MAGIC: &[u8; 8] = b"MROL-MAP";
@@ -90,8 +90,8 @@ pub(crate) fn head_of(bytes: &[u8]) -> Option<u64> {
     Some(u64_at(header_4(bytes)?, HEAD_AT))
 }
 
-/// Writes the head of the journal, and what the file says of its parts, into the map file `bytes`, which says nothing of
-/// parts before.
+/// Writes the head of the journal, and what the file says of its parts, into the map file `bytes`, which says nothing
+/// of parts before.
 pub(crate) fn complete(bytes: &mut Vec<u8>, head: u64, parts: &[u8]) {
     bytes[HEAD_AT..UUID_AT].copy_from_slice(&head.to_le_bytes());
     bytes[PARTS_AT..HEADER_BYTES].copy_from_slice(&parts_lock(parts));

@@ -11,7 +11,7 @@ use mrol_map::visibility::{VIEWPOINT_MEMORY_MAX, ViewpointSet};
 /// Viewpoints that memory is reserved for at once.
 const VIEWPOINTS_PER_RESERVE: usize = 64;
 /// Viewpoints between two checks of the stop signal: some milliseconds.
-const VIEWPOINTS_PER_LOOK: usize = 16;
+const VIEWPOINTS_PER_STOP_CHECK: usize = 16;
 /// Most bytes of a viewpoint: an image, a pose and a revision.
 const RECORD_BYTES_MAX: usize = 8192 + 128;
 
@@ -24,7 +24,7 @@ impl Body<'_> {
     ) -> Result<ViewpointSet, MapFileError<E>> {
         let (mut viewpoints, mut last) = (ViewpointSet::default(), 0);
         let records = self.records(number::VIEWPOINTS, RECORD_BYTES_MAX);
-        for (i, record) in self.stop.paced(records, VIEWPOINTS_PER_LOOK).enumerate() {
+        for (i, record) in self.stop.paced(records, VIEWPOINTS_PER_STOP_CHECK).enumerate() {
             if i.is_multiple_of(VIEWPOINTS_PER_RESERVE) {
                 memory.reserve(VIEWPOINTS_PER_RESERVE * VIEWPOINT_MEMORY_MAX)?;
             }

@@ -13,9 +13,9 @@ use mrol_map::util::StopSignal;
 use mrol_map::visibility::ViewpointSet;
 
 /// Records (scans and requests) between two checks of the stop signal: a millisecond.
-const RECORDS_PER_LOOK: usize = 1024;
+const RECORDS_PER_STOP_CHECK: usize = 1024;
 /// Numbers between two checks of the stop signal: a millisecond.
-const NUMBERS_PER_LOOK: usize = 128 << 10;
+const NUMBERS_PER_STOP_CHECK: usize = 128 << 10;
 
 /// Encodes the body of a snapshot with those of its viewpoints that are to be in it; incomplete once stopped.
 pub(super) fn body_of(snapshot: &Snapshot, viewpoints: &ViewpointSet, stop: StopSignal<'_>) -> Vec<u8> {
@@ -65,7 +65,7 @@ fn append<T: Into<R>, R>(
 ) {
     let mut items = items.into_iter();
     while !stop.is_stopped() {
-        let records: Vec<R> = items.by_ref().take(RECORDS_PER_LOOK).map(Into::into).collect();
+        let records: Vec<R> = items.by_ref().take(RECORDS_PER_STOP_CHECK).map(Into::into).collect();
         if records.is_empty() {
             return;
         }
@@ -132,7 +132,7 @@ struct Packed<'a, T> {
 impl<'a, T> Packed<'a, T> {
     fn of(number: u64, values: &'a [T], varint: fn(&T) -> u64, stop: StopSignal<'_>) -> Self {
         let bytes_of = |values: &[T]| values.iter().map(|it| encoded_len_varint(varint(it))).sum::<usize>();
-        let bytes = stop.pieces(values, NUMBERS_PER_LOOK).map(bytes_of).sum();
+        let bytes = stop.pieces(values, NUMBERS_PER_STOP_CHECK).map(bytes_of).sum();
         Self { number, values, varint, bytes }
     }
 
@@ -145,7 +145,7 @@ impl<'a, T> Packed<'a, T> {
         if self.bytes > 0 {
             encode_key(self.number as u32, WireType::LengthDelimited, body);
             encode_varint(self.bytes as u64, body);
-            for values in stop.pieces(self.values, NUMBERS_PER_LOOK) {
+            for values in stop.pieces(self.values, NUMBERS_PER_STOP_CHECK) {
                 values.iter().for_each(|value| encode_varint((self.varint)(value), body));
             }
         }

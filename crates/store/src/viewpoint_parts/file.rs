@@ -35,7 +35,7 @@ pub(crate) const PART_HEADER_BYTES: usize = 44;
 const PART_BYTES_MAX: u64 = 8 << 30;
 
 /// Viewpoints between two checks of the stop signal: some milliseconds.
-const VIEWPOINTS_PER_LOOK: usize = 16;
+const VIEWPOINTS_PER_STOP_CHECK: usize = 16;
 
 /// The file names of the part `number`, and of its copy.
 pub(crate) fn part_names(number: u64) -> [String; 2] {
@@ -128,7 +128,7 @@ impl ViewpointPart {
             .map_err(|e| format!("the body from offset {PART_HEADER_BYTES} on: {e}"))?;
         let message = pb::ViewpointPart::decode(&body[..]).map_err(|e| format!("the body: {e}"))?;
         let uuid = Uuid::from_slice(&header[CHECKED_FROM..32]).map_err(|e| format!("uuid: {e}"))?;
-        let viewpoints = stop.paced(message.viewpoints, VIEWPOINTS_PER_LOOK).map(TryInto::try_into);
+        let viewpoints = stop.paced(message.viewpoints, VIEWPOINTS_PER_STOP_CHECK).map(TryInto::try_into);
         let viewpoints: Vec<(u64, Arc<Viewpoint>)> = viewpoints.collect::<Result<_, Unreadable>>()?;
         match viewpoints.is_sorted_by(|(one, _), (next, _)| one < next) {
             true => Ok((uuid, Self { viewpoints, checksum })),

@@ -43,8 +43,8 @@ impl ViewpointParts {
         let has_new = !new.is_empty();
         let mut bytes: u64 = new.iter().map(|revision| bytes_of(*revision)).sum();
         let mut kept = Vec::new();
-        // The newest first: a part is written again where as much comes with it, so that each viewpoint is written again a few
-        // times at most before it lies in a large part.
+        // The newest first: a part is written again where as much comes with it, so that each viewpoint is written
+        // again a few times at most before it lies in a large part.
         for part in self.parts.iter().rev() {
             let used: Vec<u64> =
                 part.revisions().filter(|revision| viewpoints.get(*revision).is_some()).collect();

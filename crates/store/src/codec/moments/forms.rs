@@ -8,7 +8,7 @@ use mrol_map::util::StopSignal;
 use mrol_map::voxel::{MomentSet, Moments};
 
 /// Voxels whose moments are written or read between two checks of the stop signal: some milliseconds.
-pub(super) const VOXELS_PER_LOOK: usize = 16 << 10;
+pub(super) const VOXELS_PER_STOP_CHECK: usize = 16 << 10;
 /// Form of ten numbers in steps. Smaller forms are numbers of points.
 const STEPS: u8 = FewPoints::MOST + 1;
 /// Form of ten numbers in units.
@@ -18,7 +18,7 @@ const UNITS: u8 = STEPS + 1;
 pub(super) fn write(set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     let mut forms = Vec::with_capacity(set.as_slice().len());
     let (mut points, mut numbers) = (Vec::new(), Vec::new());
-    for (_, moments) in stop.pieces(set.as_slice(), VOXELS_PER_LOOK).flatten() {
+    for (_, moments) in stop.pieces(set.as_slice(), VOXELS_PER_STOP_CHECK).flatten() {
         let in_units = moments.to_numbers();
         let in_steps = steps::of_units(&in_units);
         match (in_steps.as_ref().and_then(FewPoints::of), in_steps) {
@@ -61,7 +61,7 @@ pub(super) fn read(
             .ok_or_else(|| format!("moments of voxel {i} are those of no points"))
     };
     let mut moments = Vec::with_capacity(voxels);
-    for moments_of_voxel in stop.paced(forms.iter().enumerate(), VOXELS_PER_LOOK).map(voxel) {
+    for moments_of_voxel in stop.paced(forms.iter().enumerate(), VOXELS_PER_STOP_CHECK).map(voxel) {
         moments.push(moments_of_voxel?);
     }
     match unread {

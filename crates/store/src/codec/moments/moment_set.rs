@@ -1,6 +1,6 @@
 //! A set of moments as a message, and back.
 
-use super::forms::{self, VOXELS_PER_LOOK};
+use super::forms::{self, VOXELS_PER_STOP_CHECK};
 use crate::codec::unreadable::Unreadable;
 use crate::pb;
 use mrol_map::util::StopSignal;
@@ -63,7 +63,7 @@ fn keys_of(key_gaps: &[u64], stop: StopSignal<'_>) -> Result<Vec<VoxelKey>, Unre
         MomentSet::key(bits).ok_or_else(|| format!("voxel key {bits:#x} is out of range"))
     };
     let mut keys = Vec::with_capacity(key_gaps.len());
-    for gap in stop.paced(key_gaps.iter().enumerate(), VOXELS_PER_LOOK) {
+    for gap in stop.paced(key_gaps.iter().enumerate(), VOXELS_PER_STOP_CHECK) {
         keys.push(key(gap)?);
     }
     Ok(keys)
