@@ -24,12 +24,6 @@
 //! * Where a limit is: [`service::Limits`] for those of the server, each a setting of the section `limits`;
 //!   [`map::MapSettings`] for the ranges of a map's settings.
 
-pub use mrol_client as client;
-pub use mrol_client::wire;
-pub use mrol_map::{align, bloom, geometry, map, mapping, planning, scan, util, visibility, voxel};
-pub use mrol_service as service;
-pub use mrol_store as store;
-
 pub mod access;
 pub mod admission;
 mod build_info;
@@ -43,3 +37,9 @@ pub mod json;
 pub mod middleware;
 pub mod server;
 pub mod telemetry;
+
+pub use mrol_client as client;
+pub use mrol_client::wire;
+pub use mrol_map::{align, bloom, geometry, map, mapping, planning, scan, util, visibility, voxel};
+pub use mrol_service as service;
+pub use mrol_store as store;

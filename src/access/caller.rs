@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Allowance, Key};
+use super::allowance::Allowance;
+use super::key::Key;
 use mrol_service::{AllowedMaps, AllowedScans, ServiceError};
 
 /// Who asks for something: the holder of a key, or anybody.

@@ -3,7 +3,11 @@
 use axum::http::header::AUTHORIZATION;
 use axum::http::{Extensions, HeaderMap, Request};
 
-use super::{Access, Caller, Operation, Peer, Secret, asker_of};
+use super::caller::Caller;
+use super::operation::Operation;
+use super::peer::{Peer, asker_of};
+use super::rules::Access;
+use super::secret::Secret;
 use mrol_map::map::CallerName;
 use mrol_service::{MapService, Reason, ServiceError};
 

@@ -6,7 +6,10 @@ use std::time::SystemTime;
 
 use tokio_util::sync::CancellationToken;
 
-use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
+use super::allowance::{Allowance, KeyLimits};
+use super::expiry::Expiry;
+use super::scope::Scope;
+use super::secret::Digest;
 use mrol_map::map::RobotName;
 use mrol_service::{AllowedMaps, AllowedScans, Reason, ServiceError};
 

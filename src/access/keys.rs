@@ -6,10 +6,13 @@ use std::time::{Duration, SystemTime};
 
 use subtle::ConditionallySelectable;
 
+use super::expiry::Expiry;
 use super::key::Ended;
-use super::key_file::{self, KeyFileError};
+use super::key::{Key, KeyName};
+use super::key_file;
+use super::key_file::KeyFileError;
 use super::reload::is_open_to_others;
-use super::{Expiry, Key, KeyName, Secret};
+use super::secret::Secret;
 
 /// All keys of a file.
 #[derive(Debug)]
@@ -82,7 +85,8 @@ fn continued(key: Key, former: &[Arc<Key>]) -> Key {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::access::{KeyName, Scope};
+    use crate::access::key::KeyName;
+    use crate::access::scope::Scope;
     use mrol_service::{AllowedMaps, Reason};
 
     fn key(name: &str, secret: &str, scope: Scope) -> Key {

@@ -19,17 +19,19 @@ mod scope;
 mod secret;
 mod site;
 
-pub use allowance::{Allowance, InWork, KeyLimits};
-pub use caller::Caller;
-pub use expiry::Expiry;
-pub use gate::{Authorized, Gate};
-pub use key::{Key, KeyName};
-pub use key_file::{KeyEntry, KeyFileError, add_to_file, list_file, revoke_in_file, rotate_in_file, to_toml};
-pub use keys::Keys;
-pub use operation::{Operation, Route};
-pub use peer::{Peer, asker_of};
-pub use reload::{Reload, ReloadableFile, is_open_to_others};
-pub use rules::Access;
-pub use scope::Scope;
-pub use secret::{Digest, Secret};
-pub use site::{ReachedAt, is_host};
+pub use self::allowance::{Allowance, InWork, KeyLimits};
+pub use self::caller::Caller;
+pub use self::expiry::Expiry;
+pub use self::gate::{Authorized, Gate};
+pub use self::key::{Key, KeyName};
+pub use self::key_file::{
+    KeyEntry, KeyFileError, add_to_file, list_file, revoke_in_file, rotate_in_file, to_toml,
+};
+pub use self::keys::Keys;
+pub use self::operation::{Operation, Route};
+pub use self::peer::{Peer, asker_of};
+pub use self::reload::{Reload, ReloadableFile, is_open_to_others};
+pub use self::rules::Access;
+pub use self::scope::Scope;
+pub use self::secret::{Digest, Secret};
+pub use self::site::{ReachedAt, is_host};

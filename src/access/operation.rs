@@ -3,8 +3,8 @@
 //! Both protocols look a request up here before anything else is done with it. What is not in the table is not
 //! answered, so nothing can be served without a rule.
 
-use super::Scope;
-use super::Scope::{Admin, Insert, Read, Write};
+use super::scope::Scope;
+use super::scope::Scope::{Admin, Insert, Read, Write};
 
 /// Where HTTP has an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,9 +6,16 @@ use std::time::{Duration, SystemTime};
 
 use axum::http::Request;
 
+use super::caller::Caller;
+use super::expiry::Expiry;
+use super::key::{Key, KeyName};
+use super::key_file::KeyFileError;
+use super::keys::Keys;
+use super::operation::Operation;
 use super::reload::ReloadableFile;
+use super::scope::Scope;
+use super::secret::Secret;
 use super::site::{Hosts, check_origin};
-use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
 use mrol_service::{AllowedMaps, Reason, ServiceError};
 
 /// The rules of a server. A clone is another handle on the same ones.

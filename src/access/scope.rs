@@ -1,6 +1,7 @@
 //! How much a key may do.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 

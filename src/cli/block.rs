@@ -1,6 +1,7 @@
 //! `mrol block`: takes a part of a map out, as masks or as distances.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::fs;
 use std::path::PathBuf;
 
@@ -8,9 +9,9 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
 use mrol_map::map::{DistanceBlock, Region};
 use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};

@@ -1,6 +1,7 @@
 //! `mrol check`: asks whether a body fits, at poses or along a motion.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use mrol_client::Client;
 use mrol_map::geometry::{Point, Pose, rotation_xyzw, translation_m};

@@ -1,6 +1,7 @@
 //! `mrol classify`: asks what is known of points.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -8,8 +9,8 @@ use serde::Serialize;
 use super::asked::AskedOptions;
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use mrol_map::geometry::Point;
 use mrol_map::util::Keyword;

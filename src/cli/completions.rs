@@ -6,9 +6,9 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 use serde::Serialize;
 
-use super::CommandLine;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use super::command_line::CommandLine;
+use crate::console::CliError;
+use crate::console::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -3,8 +3,8 @@
 use clap::Subcommand;
 
 use super::serve::ServeOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

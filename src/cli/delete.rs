@@ -1,15 +1,16 @@
 //! `mrol delete`: deletes voxels from a map.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
 
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
 use mrol_map::geometry::Point;
 use mrol_map::map::{Region, RequestId};

@@ -1,14 +1,15 @@
 //! `mrol doctor`: checks a data folder.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::console::error::CliError;
-use crate::console::map_report::{bytes, count};
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
+use crate::console::{bytes, count};
 use mrol_map::map::MapName;
 use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
 use mrol_store::{DataDir, StoreSettings};

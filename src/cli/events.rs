@@ -1,15 +1,16 @@
 //! `mrol events`: tells what became of the scans that robots sent.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description;
 
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::json::{JsonEvent, JsonScan};
 use mrol_map::align::Verdict;
 use mrol_map::map::RobotName;

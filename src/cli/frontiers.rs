@@ -1,14 +1,15 @@
 //! `mrol frontiers`: asks where free space ends and nothing is known beyond.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
 use crate::json::JsonPose;
 use mrol_map::planning::Frontier;

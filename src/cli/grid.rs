@@ -1,6 +1,7 @@
 //! `mrol grid`: draws a map from above, for the map server of ROS and Nav2.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,9 +9,9 @@ use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
 use mrol_map::planning::{Grid, GridArea};
 use mrol_service::{GridQuestion, GridScope};

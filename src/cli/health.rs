@@ -1,6 +1,7 @@
 //! `mrol health`: asks whether a server is ready.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -9,8 +10,8 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
 use super::remote::ServerOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

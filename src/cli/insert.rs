@@ -1,6 +1,7 @@
 //! `mrol insert`: sends scans to a map of a server.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -11,11 +12,11 @@ use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use super::maps::OptionalSettings;
 use super::remote::MapOptions;
 use super::scan_report::{PLACE_HEAD, name_of, name_width, place};
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
-use crate::console::truth::true_poses;
+use crate::console::true_poses;
 use crate::json::JsonScan;
 use mrol_client::{Client, ClientError, new_session};
 use mrol_map::align::Method;

@@ -1,6 +1,7 @@
 //! `mrol keepout`: puts, removes and lists keep-outs of a map.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use clap::Subcommand;
@@ -8,8 +9,8 @@ use serde::Serialize;
 
 use super::remote::MapOptions;
 use crate::access::Expiry;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use crate::json::{JsonKeepOut, JsonShape};
 use mrol_map::map::{KeepOutName, KeepOutShape, Prism, Region, RequestId};
@@ -103,7 +104,7 @@ struct Delete {
 }
 
 #[derive(Debug, clap::Args)]
-struct List {
+pub(crate) struct List {
     #[command(flatten)]
     map: MapOptions,
 }

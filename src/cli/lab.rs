@@ -2,7 +2,7 @@
 
 use clap::Subcommand;
 
-use crate::console::error::CliError;
+use crate::console::CliError;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

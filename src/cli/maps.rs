@@ -1,14 +1,15 @@
 //! `mrol maps`: make, list, describe and delete the maps of a server.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use clap::Subcommand;
 use serde::Serialize;
 
 use super::remote::ServerOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::MapReport;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::MapReport;
+use crate::console::Output;
 use crate::console::parse;
 use mrol_client::{NewFilter, NewMap};
 use mrol_map::map::MapName;

@@ -1,6 +1,7 @@
 //! `mrol nearest`: asks how far the nearest occupied voxel is.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -9,8 +10,8 @@ use super::asked::AskedOptions;
 use super::met::met;
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use mrol_map::geometry::Point;
 use mrol_map::planning::MeasuredTo;

@@ -1,12 +1,13 @@
 //! `mrol observers`: lists the scans that touched a voxel.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use crate::json::{JsonObservers, JsonObservingScan};
 use mrol_map::geometry::Point;

@@ -1,6 +1,7 @@
 //! `mrol query`: asks which points are in occupied voxels.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -8,10 +9,10 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::{count, percent};
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
+use crate::console::{count, percent};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::Lookup;
 use mrol_map::scan::read_points;

@@ -1,14 +1,15 @@
 //! `mrol rays`: asks what rays meet.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
 use mrol_map::geometry::Point;
 use mrol_map::planning::Unknown;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mrol_client::{Client, Credentials};
 use mrol_map::map::MapName;
 
-use crate::console::error::CliError;
+use crate::console::CliError;
 use crate::console::parse;
 
 /// Heading of these options in a command's help.
@@ -90,7 +90,7 @@ impl std::fmt::Debug for Hidden {
     }
 }
 
-fn read(file: &Path) -> Result<Vec<u8>, CliError> {
+pub(crate) fn read(file: &Path) -> Result<Vec<u8>, CliError> {
     fs::read(file).map_err(|error| CliError::failed(format!("{}: {error}", file.display())))
 }
 

@@ -7,9 +7,9 @@ use std::pin::pin;
 use serde_json::json;
 
 use crate::config::{Config, ConfigError, unknown_variables};
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::Serving;
-use crate::console::error::CliError;
-use crate::console::output::Output;
 use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
 use crate::telemetry::start_logging;
 

@@ -1,15 +1,16 @@
 //! `mrol snapshot` and `mrol restore`: backs up the maps of a server, and restores them.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::remote::ServerOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::{bytes, count};
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::parse;
+use crate::console::{bytes, count};
 use mrol_client::Client;
 use mrol_map::map::MapName;
 use mrol_service::{MapList, UnavailableMap};

@@ -1,13 +1,14 @@
 //! `mrol undo`: takes scans and deletions back.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::count;
 use crate::console::parse;
 use mrol_map::map::{RequestId, RobotName, SessionName};
 use mrol_service::{UndoAnswer, UndoTarget};

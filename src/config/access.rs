@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::ConfigError;
+use super::error::ConfigError;
 use crate::access::is_host;
 
 /// Settings of access: which keys are valid, and who needs none. Keys are in a file of their own, so that the settings

@@ -1,6 +1,6 @@
 //! Checks of the section `limits`. The limits themselves are [`Limits`].
 
-use super::ConfigError;
+use super::error::ConfigError;
 use mrol_map::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 use mrol_service::{EVENTS_MAX, Limits};
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::ConfigError;
+use super::error::ConfigError;
 use mrol_map::map::TrajectorySpacing;
 use mrol_store::{Durability, StoreMode, StoreSettings};
 

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use super::{Config, ConfigError};
+use super::error::ConfigError;
+use super::settings::Config;
 
 /// Prefix of the variables' names. `__` separates section and setting: `MROL_HTTP__LISTEN`.
 pub(super) const PREFIX: &str = "MROL_";

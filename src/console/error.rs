@@ -1,7 +1,9 @@
 //! Errors of a command, and their exit codes.
 
-use std::fmt::{self, Display};
-use std::io::{self, ErrorKind, Write};
+use std::fmt;
+use std::fmt::Display;
+use std::io;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 

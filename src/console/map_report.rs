@@ -1,6 +1,7 @@
 //! Output of a map's description: the same object as over HTTP, or a table.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use indicatif::{BinaryBytes, HumanCount};

@@ -6,13 +6,17 @@ pub mod error;
 pub mod map_report;
 pub mod output;
 pub mod parse;
-mod plan;
+pub(super) mod plan;
 pub mod runtime;
 mod serving;
 pub mod statistics;
 pub mod truth;
 
-pub use error::CliError;
-pub use output::Output;
-pub use plan::{PlanLayer, plan};
-pub use serving::Serving;
+pub use map_report::{MapReport, bytes, count, percent};
+pub use statistics::Statistics;
+pub use truth::true_poses;
+
+pub use self::error::CliError;
+pub use self::output::Output;
+pub use self::plan::{PlanLayer, plan};
+pub use self::serving::Serving;

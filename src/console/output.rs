@@ -1,7 +1,8 @@
 //! Output of commands.
 
 use std::fmt::Display;
-use std::io::{self, Write};
+use std::io;
+use std::io::Write;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;

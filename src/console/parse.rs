@@ -5,7 +5,8 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use mrol_map::align::localize::SearchBox;
-use mrol_map::geometry::{self, Point, Pose};
+use mrol_map::geometry;
+use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{KeepOutName, MapName, Region, RequestId, RobotName, SessionName};
 use mrol_map::planning::{GridArea, Sphere};
 use mrol_map::util::Keyword;
@@ -137,7 +138,7 @@ pub fn request_id(text: &str) -> Result<RequestId, String> {
 }
 
 /// Parses `N` numbers, separated by spaces or commas.
-fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
+pub(crate) fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
     <[f64; N]>::try_from(number_list(text, form)?)
         .map_err(|numbers| format!("{N} numbers are needed, \"{form}\", got {}", numbers.len()))
 }

@@ -1,6 +1,7 @@
 //! Where a server answers.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::net::SocketAddr;
 
 use serde::Serialize;

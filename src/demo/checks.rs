@@ -1,11 +1,12 @@
 //! Checks of the demonstration's results.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
-use crate::console::error::CliError;
-use crate::console::map_report::count;
+use crate::console::CliError;
+use crate::console::count;
 use mrol_service::MapInfo;
 
 /// Largest median error, in voxels, over a tour of 60 scans without odometry, with a margin for the order in which the

@@ -5,9 +5,9 @@ use std::net::SocketAddr;
 use tempfile::TempDir;
 
 use crate::config::Config;
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::Serving;
-use crate::console::error::CliError;
-use crate::console::output::Output;
 use crate::server;
 use crate::telemetry::{LogFormat, Logging, start_logging};
 

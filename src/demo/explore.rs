@@ -1,18 +1,19 @@
 //! `mrol demo --explore`: a robot that nobody steers maps the building.
 
 use std::collections::BTreeSet;
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::console::error::CliError;
-use crate::console::map_report::{count, percent};
-use crate::console::output::Output;
+use super::explorer::{Explorer, Step, Visible, never_collided};
+use crate::console::CliError;
+use crate::console::Output;
 use crate::console::{PlanLayer, plan};
-use crate::demo::explorer::{Explorer, Step, Visible, never_collided};
+use crate::console::{count, percent};
 use mrol_client::Client;
 use mrol_map::map::MapName;
 use mrol_map::planning::Frontier;

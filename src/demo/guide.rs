@@ -1,10 +1,10 @@
 //! Text on where to look next.
 
-use super::MAP;
+use super::command::MAP;
 use crate::console::Serving;
 
 /// The link to the page that shows the demonstration's map.
-pub(super) fn page(serving: &Serving) -> String {
+pub(crate) fn page(serving: &Serving) -> String {
     format!("http://{}/#map={MAP}", serving.http)
 }
 

@@ -1,13 +1,14 @@
 //! Reports of the demonstration before and during the tours.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
 use super::planner::BATCH_POINTS;
 use super::robot::Robot;
 use crate::console::Serving;
-use crate::console::map_report::{count, percent};
+use crate::console::{count, percent};
 use mrol_map::map::MapSettings;
 use mrol_service::MapInfo;
 

@@ -1,6 +1,7 @@
 //! Report of the demonstration at its end.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -8,7 +9,7 @@ use serde_json::{Value, json};
 use super::checks::Checks;
 use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
-use crate::console::map_report::{bytes, count, percent};
+use crate::console::{bytes, count, percent};
 use mrol_service::MapInfo;
 
 /// The summary.

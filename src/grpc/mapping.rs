@@ -4,10 +4,10 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::adapter::{Adapter, answered, service_of};
 use super::former::{Keeping, same_map};
 use super::stream::{Answers, Message};
 use super::stubs::mapping_server::Mapping;
-use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use mrol_client::wire::{pb, status_of};
 use mrol_service::{MapService, ServiceError};

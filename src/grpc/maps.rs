@@ -4,11 +4,12 @@ use bytes::{Bytes, BytesMut};
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::adapter::{Adapter, answered, service_of};
 use super::stubs::maps_server::Maps;
-use super::{Adapter, answered, service_of};
 use crate::access::Authorized;
 use crate::admission::InboundBody;
-use mrol_client::wire::{self, pb, snapshot_bytes, snapshot_pieces, status_of};
+use mrol_client::wire;
+use mrol_client::wire::{pb, snapshot_bytes, snapshot_pieces, status_of};
 use mrol_map::map::MapName;
 use mrol_service::{AllowedMaps, MapList, Reason, ServiceError};
 

@@ -4,10 +4,10 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::adapter::{Adapter, answered, service_of};
 use super::former::{Keeping, same_map};
 use super::stream::{Answers, Message};
 use super::stubs::occupancy_server::Occupancy;
-use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use mrol_client::wire::{listing_bytes, pb, status_of, voxel_chunks};
 use mrol_map::map::MapName;

@@ -3,9 +3,10 @@
 use prost::Message;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::adapter::{Adapter, answered, service_of};
 use super::former::{FormerBody, Keeping, same_map};
-use super::stream::{self, Answers, Counted};
-use super::{Adapter, answered, service_of};
+use super::stream;
+use super::stream::{Answers, Counted};
 use crate::access::Operation;
 use crate::admission::{InboundBody, off_runtime};
 use mrol_client::wire::{QuestionMessage, pb, question_of, status_of};

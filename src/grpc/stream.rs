@@ -5,15 +5,17 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Instant;
 
-use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio::sync::mpsc;
+use tokio::sync::mpsc::{Receiver, Sender};
 use tokio_stream::Stream;
 use tonic::{Code, Request, Status, Streaming};
 use tracing::Instrument;
 
+use super::adapter::Adapter;
 use super::decompression::{Compressed, Inflation};
 use super::former::Keeping;
 use super::middleware::Grpc;
-use super::{Adapter, status};
+use super::status;
 use crate::access::{Authorized, Operation};
 use crate::admission::{Admission, InboundBody, MemoryPermit, RateLimitKey, draining};
 use crate::middleware::Protocol;

@@ -7,7 +7,8 @@ use axum::http::request::Parts;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::error::{self, HttpError};
+use super::error;
+use super::error::HttpError;
 use crate::access::{Authorized, Operation};
 use crate::admission::Endings;
 use crate::middleware::Protocol;

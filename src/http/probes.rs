@@ -7,11 +7,11 @@ use axum::response::IntoResponse;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::Adapter;
+use super::adapter::Adapter;
 use super::error::{HttpError, Problem};
-use super::maps::UnavailableResponse;
+use super::forms::NoParams;
 use super::middleware::Service;
-use super::params::NoParams;
+use super::operations::UnavailableResponse;
 use crate::access::Authorized;
 use crate::telemetry::Metrics;
 use mrol_service::MapService;

@@ -4,10 +4,12 @@ use axum::Router;
 use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
-use super::{
-    Adapter, block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy,
-    openapi, probes, question, reader, scans, trajectory, undo, viewer, voxels, watch,
+use super::adapter::Adapter;
+use super::operations::{
+    block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, scans,
+    trajectory, undo, voxels, watch,
 };
+use super::{openapi, probes, question, reader, viewer};
 use crate::access::Operation;
 
 /// A route for every operation that HTTP has, and none besides.
@@ -57,14 +59,14 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::DeleteKeepOut => on(method, keep_outs::delete),
         Operation::SnapshotMap => on(method, map_file::take),
         Operation::RestoreMap => on(method, map_file::restore),
-        Operation::ShowViewer => on(method, viewer::index),
-        Operation::GetViewerFile => on(method, viewer::file),
+        Operation::ShowViewer => on(method, viewer::pages::index),
+        Operation::GetViewerFile => on(method, viewer::pages::file),
         Operation::Live => on(method, probes::live),
         Operation::Ready => on(method, probes::ready),
         Operation::Metrics => on(method, probes::metrics),
         Operation::DescribeApi => on(method, openapi::describe),
-        Operation::ReadApi => on(method, reader::page),
-        Operation::ReadApiFile => on(method, reader::file),
+        Operation::ReadApi => on(method, reader::page::page),
+        Operation::ReadApiFile => on(method, reader::page::file),
         Operation::QueryPointsStream
         | Operation::CheckPosesStream
         | Operation::CheckSpheresStream

@@ -11,8 +11,9 @@ use axum::routing::get;
 use axum::{Json, Router};
 
 use super::error::HttpError;
-use super::params::NoParams;
-use super::probes::{self, OpeningResponse, ReadyResponse};
+use super::forms::NoParams;
+use super::probes;
+use super::probes::{OpeningResponse, ReadyResponse};
 use super::viewer;
 use crate::access::Access;
 use mrol_service::{Reason, ServiceError};
@@ -23,8 +24,8 @@ pub fn starting(progress: Arc<OpeningProgress>, access: Access) -> Router {
     Router::new()
         .route("/livez", get(probes::live))
         .route("/readyz", get(ready))
-        .route("/", get(viewer::index))
-        .route("/viewer/{file}", get(viewer::file))
+        .route("/", get(viewer::pages::index))
+        .route("/viewer/{file}", get(viewer::pages::file))
         .fallback(refuse)
         .layer(from_fn_with_state(access, named))
         .with_state(progress)

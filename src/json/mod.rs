@@ -12,18 +12,18 @@ mod scan;
 mod vectors;
 mod version;
 
-pub use event::{JsonEvent, JsonFailure};
-pub use keep_out::{JsonKeepOut, JsonShape};
-pub(crate) use keyword::described_by_words;
-pub use keyword::{ByKeyword, schema_of_words};
-pub use localization::{JsonCandidate, JsonLocalization};
-pub use map::{
+pub use self::event::{JsonEvent, JsonFailure};
+pub use self::keep_out::{JsonKeepOut, JsonShape};
+pub(crate) use self::keyword::described_by_words;
+pub use self::keyword::{ByKeyword, schema_of_words};
+pub use self::localization::{JsonCandidate, JsonLocalization};
+pub use self::map::{
     JsonFilter, JsonFilterInfo, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage, NO_FILTER,
 };
-pub use observers::{JsonObservers, JsonObservingScan};
-pub use pose::JsonPose;
-pub use scan::{JsonDirection, JsonScan};
-pub use vectors::{
+pub use self::observers::{JsonObservers, JsonObservingScan};
+pub use self::pose::JsonPose;
+pub use self::scan::{JsonDirection, JsonScan};
+pub use self::vectors::{
     Corners3, PoseMatrix, PoseNumbers, PoseVector, Quaternion, Sizes2, Sphere, Vector2, Vector3, VoxelIndex,
 };
-pub use version::JsonVersion;
+pub use self::version::JsonVersion;

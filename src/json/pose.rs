@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::vectors::{Quaternion, Vector3};
-use mrol_map::geometry::{self, Pose, PoseError};
+use mrol_map::geometry;
+use mrol_map::geometry::{Pose, PoseError};
 
 /// A pose: translation in meters, rotation as a unit quaternion x y z w.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use super::ServerError;
+use super::error::ServerError;
 use crate::access::Access;
 use crate::config::{AccessConfig, Config};
 

@@ -15,10 +15,10 @@ use tokio::time::{sleep, timeout};
 use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
-use super::CLOSING_MAX;
 use super::connection_slots::ConnectionSlot;
 use super::endpoint::Endpoint;
 use super::listener::Accepted;
+use super::starting::CLOSING_MAX;
 use super::stream::{Count, Counted, secure};
 use super::tracked_body::TrackedBody;
 use crate::access::Peer;

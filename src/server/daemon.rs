@@ -7,7 +7,8 @@ use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-use super::{Server, ServerError};
+use super::bound::Server;
+use super::error::ServerError;
 use crate::config::Config;
 
 /// A daemon that runs as it would in a process of its own, except for the memory.

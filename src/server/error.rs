@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::TlsError;
+use super::tls::TlsError;
 use crate::access::KeyFileError;
 use crate::telemetry::TelemetryError;
 use mrol_service::ServiceError;

@@ -9,7 +9,7 @@ use rustix::net::sockopt;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::time::sleep;
 
-use super::ServerError;
+use super::error::ServerError;
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::stream::Stream;

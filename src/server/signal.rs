@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::ReloadableFiles;
+use super::files::ReloadableFiles;
 
 /// Waits for the process to be told to end: ctrl-c or SIGTERM.
 pub async fn shutdown_signal() {

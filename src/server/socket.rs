@@ -1,14 +1,16 @@
 //! Unix sockets: files beside the TCP addresses, for clients on the same machine.
 
-use std::fs::{self, Permissions};
-use std::io::{self, ErrorKind};
+use std::fs;
+use std::fs::Permissions;
+use std::io;
+use std::io::ErrorKind;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
 use tokio::net::UnixListener;
 
-use super::ServerError;
+use super::error::ServerError;
 use super::protocol::Protocol;
 
 /// Who may connect: the server's user and group.

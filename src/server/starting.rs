@@ -1,18 +1,21 @@
 //! HTTP while the maps are being opened: the same socket, and answers of its own.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
-use super::CLOSING_MAX;
 use super::endpoint::Endpoint;
 use super::listener::{Accepting, TcpSocket};
 use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::telemetry::Metrics;
 use mrol_service::Limits;
+
+/// How long connections have to close once their requests are done: what is left then is idle or half open.
+pub(super) const CLOSING_MAX: Duration = Duration::from_secs(1);
 
 /// Answers until the maps are open.
 pub(super) struct Starting {

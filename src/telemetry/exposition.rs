@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Write};
 
-use super::map_counters::{self, Series};
+use super::map_counters;
+use super::map_counters::Series;
 use mrol_map::map::{FilterInfo, LevelInfo, MapName};
 use mrol_map::util::Durations;
 use mrol_service::{MapInfo, MapStorage, PoolUse, UnavailableMap};

@@ -25,7 +25,7 @@ pub(super) const SCAN_OVERLAP: &str = "mrol_scan_overlap";
 pub(super) const ALIGN_SECONDS: &str = "mrol_scan_align_seconds";
 
 /// Tells the recorder in force what each of them says.
-pub(super) fn describe() {
+pub(crate) fn describe() {
     describe_gauge!(BUILD_INFO, "1, with the version, the commit and the features that were built");
     describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
     describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");

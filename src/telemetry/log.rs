@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use tracing_appender::non_blocking::{NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
 
-use super::AUDIT;
+use super::audit::AUDIT;
 
 /// How log lines are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ const LINES_WAITING_MAX: usize = 16_384;
 pub struct Logging(#[expect(dead_code, reason = "it works when it is dropped")] WorkerGuard);
 
 /// Starts the process's log at `level`: a level or a list of `target=level`. With `audit` the lines of the
-/// [audit](super::AUDIT) are written whatever the level, and without not at all. Lines are written until the result is
+/// [audit](super::audit::AUDIT) are written whatever the level, and without not at all. Lines are written until the result is
 /// dropped.
 ///
 /// # Errors

@@ -8,7 +8,7 @@ mod map_counters;
 mod metrics;
 mod requests;
 
-pub use audit::{AUDIT, Audit};
-pub use log::{LogFormat, Logging, REQUEST, TelemetryError, start_logging};
-pub use metrics::{InUse, Metrics, OpenConnection};
-pub use requests::{RequestOutcome, RequestRecorder};
+pub use self::audit::{AUDIT, Audit};
+pub use self::log::{LogFormat, Logging, REQUEST, TelemetryError, start_logging};
+pub use self::metrics::{InUse, Metrics, OpenConnection};
+pub use self::requests::{RequestOutcome, RequestRecorder};

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use metrics::SharedString;
 
-use super::{Audit, Metrics};
+use super::audit::Audit;
+use super::metrics::Metrics;
 
 /// How a request ended.
 #[derive(Debug, Clone)]

@@ -1,16 +1,20 @@
 //! Changes of the file of keys. Each holds a lock from reading to replacing, so that none undoes another, and replaces
 //! the file as a whole, so that a server reads the former one or the new one.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::fs;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io;
+use std::io::Write;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, fchown};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
-use super::{KeyFileError, in_file, parse, to_toml};
-use crate::access::{Digest, Expiry, Key, KeyName};
+use super::reading::{KeyFileError, in_file, parse, to_toml};
+use crate::access::expiry::Expiry;
+use crate::access::key::{Key, KeyName};
+use crate::access::secret::Digest;
 
 /// Adds a key to a file, which is made where there is none, for its owner alone.
 ///

@@ -5,7 +5,11 @@ use std::num::NonZeroU32;
 use serde::{Deserialize, Serialize};
 use toml::value::Datetime;
 
-use crate::access::{Digest, Expiry, Key, KeyLimits, KeyName, Scope};
+use crate::access::allowance::KeyLimits;
+use crate::access::expiry::Expiry;
+use crate::access::key::{Key, KeyName};
+use crate::access::scope::Scope;
+use crate::access::secret::Digest;
 use mrol_map::map::{MapName, RobotName};
 use mrol_service::AllowedMaps;
 

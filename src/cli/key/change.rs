@@ -1,15 +1,16 @@
 //! `mrol key revoke` and `mrol key rotate`.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 
-use super::name;
+use super::command::name;
 use crate::access::{Expiry, KeyName, Secret, revoke_in_file, rotate_in_file};
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct RevokeKey {

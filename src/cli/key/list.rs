@@ -1,14 +1,15 @@
 //! `mrol key list`: lists keys.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
 use serde::Serialize;
 
 use crate::access::{Expiry, KeyEntry, list_file};
-use crate::console::error::CliError;
-use crate::console::output::Output;
+use crate::console::CliError;
+use crate::console::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ListKeys {

@@ -1,10 +1,11 @@
 //! Output of `mrol localize` for a scan.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::Serialize;
 
-use super::super::scan_report::{PLACE_HEAD, place};
+use crate::cli::scan_report::{PLACE_HEAD, place};
 use crate::json::JsonLocalization;
 use mrol_service::LocalizationAnswer;
 

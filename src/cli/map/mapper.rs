@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::console::error::CliError;
+use crate::console::CliError;
 use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};

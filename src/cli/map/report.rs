@@ -1,6 +1,7 @@
 //! Output of `mrol map`.
 
-use std::fmt::{self, Display};
+use std::fmt;
+use std::fmt::Display;
 
 use serde::{Serialize, Serializer};
 
@@ -8,7 +9,7 @@ use super::ample::FilterSummary;
 use super::mapper::Mapped;
 use super::truth_errors::ErrorSummary;
 use crate::cli::scan_report::{PLACE_HEAD, place};
-use crate::console::map_report::count;
+use crate::console::count;
 use crate::json::JsonPose;
 use mrol_map::util::Keyword;
 

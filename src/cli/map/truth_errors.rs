@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::console::statistics::Statistics;
+use crate::console::Statistics;
 use mrol_map::geometry::{Pose, pose_difference};
 
 /// True poses, and the errors against them so far.

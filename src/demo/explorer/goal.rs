@@ -1,6 +1,6 @@
 //! Where the robot goes: the nearest place from which a frontier can be seen.
 
-use super::Explorer;
+use super::frontier_explorer::Explorer;
 use super::standing::SENSOR_HEIGHT_M;
 use super::ways::{Cell, Ways};
 use mrol_client::ClientError;

@@ -9,8 +9,9 @@ use utoipa::openapi::path::{
 use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{Ref, RefOr, Required};
 
+use super::document::KEY;
+use super::failures;
 use super::request_id::request_id;
-use super::{KEY, failures};
 use crate::access::Operation;
 use crate::http::{reader, viewer};
 use crate::json::described;
@@ -90,8 +91,8 @@ fn path_parameters(operation: Operation, path: &str) -> impl Iterator<Item = Par
         let (schema, about, example) = match name {
             "map" => (described::MapName::schema(), "The name of the map", example_map(operation)),
             "name" => (described::KeepOutName::schema(), "The name of the keep-out", "dock"),
-            "file" => (schema_of_words(viewer::files()), "The name of the file", "main.js"),
-            _ => (schema_of_words(reader::FILES), "The name of the file", reader::FILES[0]),
+            "file" => (schema_of_words(viewer::pages::file_names()), "The name of the file", "main.js"),
+            _ => (schema_of_words(reader::page::FILES), "The name of the file", reader::page::FILES[0]),
         };
         let parameter = ParameterBuilder::new().name(name).parameter_in(ParameterIn::Path);
         let parameter = parameter.required(Required::True).description(Some(about)).schema(Some(schema));

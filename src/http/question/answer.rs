@@ -184,7 +184,7 @@ fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
 }
 
 /// Index of the voxel of a packed key.
-fn index(key: &[u8]) -> Option<[i32; 3]> {
+pub(crate) fn index(key: &[u8]) -> Option<[i32; 3]> {
     let bits = u64::from_le_bytes(key.try_into().ok()?);
     Some(VoxelKey::from_bits(bits)?.index())
 }

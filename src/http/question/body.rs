@@ -6,10 +6,10 @@ use utoipa::ToSchema;
 
 use super::answer::Array;
 use super::form::{NumbersField, PointsField};
-use crate::http::json::JsonPoints;
-use crate::http::list::List;
-use crate::http::object::Object;
-use crate::http::shapes::{BoxBody, OrientedBoxBody, SphereBody};
+use crate::http::forms::JsonPoints;
+use crate::http::forms::List;
+use crate::http::forms::Object;
+use crate::http::forms::{BoxBody, OrientedBoxBody, SphereBody};
 use crate::json::{JsonVersion, Sphere, VoxelIndex, described_by_words};
 use mrol_client::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
 use mrol_map::map::Region;

@@ -20,10 +20,10 @@ use serde::de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::admission::{InboundBody, off_runtime};
-use crate::http::Adapter;
-use crate::http::body::{self, Sent};
+use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
-use crate::http::json::JsonPoints;
+use crate::http::forms::JsonPoints;
+use crate::http::forms::{Sent, body};
 use mrol_client::wire::{QuestionMessage, bytes_of, pb, question_of};
 use mrol_map::map::MapName;
 use mrol_service::{MapService, PointCloud, Question, Reason, ServiceError};

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::answer::Answer;
-use super::asked;
+use super::asked::asked;
 use super::form::QuestionBody;
 use crate::http::error::HttpError;
+use crate::http::forms::Map;
+use crate::http::forms::Object;
+use crate::http::forms::{AnswerBytes, QuestionBytes};
 use crate::http::middleware::Service;
-use crate::http::object::Object;
-use crate::http::octets::{AnswerBytes, QuestionBytes};
-use crate::http::params::Map;
 use crate::json::{JsonPose, JsonVersion, Vector3};
 use mrol_client::wire::pb;
 use mrol_map::planning::{Frontier, FrontierView};

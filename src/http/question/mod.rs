@@ -1,6 +1,7 @@
 //! `POST /v1/maps/{map}/{question}`: what planners ask.
 
 mod answer;
+mod asked;
 mod body;
 pub(super) mod classify;
 mod form;
@@ -11,17 +12,3 @@ pub(super) mod nearest;
 pub(super) mod poses;
 pub(super) mod rays;
 pub(super) mod spheres;
-
-use mrol_client::wire::pb;
-use mrol_map::map::MapName;
-
-/// What questions have in common, as a message has it.
-fn asked(
-    map: &MapName,
-    (level, ignore_keep_outs): (u32, bool),
-    min_revision: Option<u64>,
-    map_uuid: Option<String>,
-) -> Option<pb::Asked> {
-    let (map, map_uuid) = (map.to_string(), map_uuid.unwrap_or_default());
-    Some(pb::Asked { map, level, min_revision, map_uuid, ignore_keep_outs })
-}

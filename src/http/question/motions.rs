@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::answer::{Answer, Array};
-use super::asked;
+use super::asked::asked;
 use super::body::{BodyField, DescribedIgnored, IgnoredList, ignored_of};
 use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
+use crate::http::forms::Map;
+use crate::http::forms::Object;
+use crate::http::forms::{AnswerBytes, QuestionBytes};
 use crate::http::middleware::Service;
-use crate::http::object::Object;
-use crate::http::octets::{AnswerBytes, QuestionBytes};
-use crate::http::params::Map;
 use crate::json::described;
 use crate::json::{ByKeyword, JsonVersion, PoseNumbers};
 use mrol_client::wire::pb;

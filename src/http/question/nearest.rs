@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::answer::{Answer, Array};
-use super::asked;
+use super::asked::asked;
 use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
-use crate::http::json::JsonPoints;
+use crate::http::forms::JsonPoints;
+use crate::http::forms::Map;
+use crate::http::forms::{AnswerBytes, QuestionBytes};
 use crate::http::middleware::Service;
-use crate::http::octets::{AnswerBytes, QuestionBytes};
-use crate::http::params::Map;
 use crate::json::described;
 use crate::json::{ByKeyword, JsonVersion, Vector3, VoxelIndex};
 use mrol_client::wire::pb;

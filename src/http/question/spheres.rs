@@ -6,14 +6,14 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::answer::Answer;
-use super::asked;
+use super::asked::asked;
 use super::body::CheckedResponse;
 use super::body::{AnswerWord, DescribedIgnored, IgnoredList, collisions_of, ignored_of};
 use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
+use crate::http::forms::Map;
+use crate::http::forms::{AnswerBytes, QuestionBytes};
 use crate::http::middleware::Service;
-use crate::http::octets::{AnswerBytes, QuestionBytes};
-use crate::http::params::Map;
 use crate::json::described;
 use crate::json::{ByKeyword, Sphere};
 use mrol_client::wire::pb;

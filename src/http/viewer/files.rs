@@ -6,7 +6,7 @@ use axum::http::HeaderValue;
 use sha2::{Digest, Sha256};
 
 /// A file of the page.
-pub(super) struct File {
+pub(crate) struct File {
     pub(super) name: &'static str,
     /// What it holds: all of them are text.
     pub(super) text: &'static str,
@@ -36,7 +36,7 @@ pub(super) const INDEX: File =
     File { name: "index.html", text: include_str!("../../../clients/viewer/page/index.html") };
 
 /// What the page loads.
-pub(super) const FILES: &[File] = files! {
+pub(crate) const FILES: &[File] = files! {
     "answers.js",
     "api.js",
     "arrivals.js",

@@ -1,9 +1,11 @@
 //! What is counted, and what of it a scrape gets.
 
-use super::*;
+use super::recorder::*;
 use mrol_map::align::Verdict;
 use mrol_map::map::Lookup;
-use mrol_service::Change;
+use mrol_map::map::{MapName, RobotName};
+use mrol_service::{Change, End, Ended, JudgedScan, Observer, Outcome};
+use std::time::Duration;
 
 /// A scan that was judged.
 fn judged(robot: &str, verdict: Verdict) -> JudgedScan {

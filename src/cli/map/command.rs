@@ -1,0 +1,257 @@
+//! The command `mrol map`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use uuid::Uuid;
+
+use super::ample::FalsePositives;
+use super::mapper::{Mapped, Mapper};
+use super::report::{ScanLine, Summary};
+use super::truth_errors::TruthErrors;
+use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
+use crate::cli::scan_report::name_of;
+use crate::console::CliError;
+use crate::console::Output;
+use crate::console::parse;
+use crate::console::true_poses;
+use mrol_map::align::AlignmentSettings;
+use mrol_map::bloom::FilterSettings;
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapSettings};
+use mrol_map::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
+use mrol_store::{Disk, Snapshot};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol map scans/ --resolution 0.05 --levels 5
+  mrol map scans/ --resolution 0.1 --levels 6 --trajectory-out poses.txt --out hall.mrol
+  mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
+  mrol map scans/ --resolution 0.1 --truth true.txt --at-truth --out hall.mrol
+  mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
+                                                             are the filters ample? (last line)
+  mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
+                                                             a map for queries, in a small part of the memory
+  mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
+                                                             serve the map
+
+The first scan goes in at the origin (or --first-pose), each other one is aligned from the last accepted pose;
+one that does not align is left out. With --truth line k of the file belongs to scan k, and errors are those of
+inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a last object \"summary\" is
+printed when --truth or --lookup is given.";
+
+/// Make a map of scans in this process, no server needed
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Map {
+    /// Scan files, or folders of them: .ply .pcd .xyz .f32
+    #[arg(required = true, value_name = "DIR_OR_FILES")]
+    scans: Vec<PathBuf>,
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS")]
+    resolution: f64,
+    /// Number of levels, each twice as coarse as the one before: 1 to 12
+    #[arg(long, default_value_t = LEVELS_DEFAULT)]
+    levels: u32,
+    /// Where the first scan was taken: "x y z qx qy qz qw" [default: the origin]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
+    first_pose: Option<Pose>,
+    /// Write the poses of accepted scans as a TUM file, a line `k x y z qx qy qz qw` for scan k
+    #[arg(long, value_name = "FILE")]
+    trajectory_out: Option<PathBuf>,
+    /// Write the map to a file; `mrol serve` reads those in the folder maps of its data folder
+    #[arg(long, value_name = "FILE.mrol")]
+    out: Option<PathBuf>,
+    /// True poses, a TUM file: report the errors
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Put the scans at their true poses, without aligning
+    #[arg(long, requires = "truth", conflicts_with = "first_pose")]
+    at_truth: bool,
+    /// Share of a scan's points that must fall in occupied voxels for it to be accepted [default: 0.2]
+    #[arg(long, value_name = "SHARE")]
+    min_overlap: Option<f64>,
+    /// Leave a robot lost once its scans are refused. Otherwise each refused scan is aligned from other guesses, then
+    /// searched for in the whole map, where two scans in a row have to agree
+    #[arg(long)]
+    no_recovery: bool,
+    /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one
+    /// before it
+    #[arg(long, value_enum, default_value_t)]
+    guess: GuessName,
+    #[command(flatten)]
+    alignment: AlignmentOptions,
+    #[command(flatten)]
+    points: PointOptions,
+    /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
+    #[arg(long, value_parser = parse::keyword::<Lookup>())]
+    lookup: Option<Lookup>,
+    /// Hash functions of the counting Bloom filters, k of eq. (1): 1 to 10
+    #[arg(long, value_name = "K", default_value_t = FilterSettings::default().hashes)]
+    filter_hashes: u32,
+    /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
+    #[arg(long, value_name = "BITS", default_value_t = FilterSettings::default().bits_per_key)]
+    filter_bits_per_key: f64,
+    /// No filters: the exact set answers every look-up
+    #[arg(long, conflicts_with_all = ["filter_hashes", "filter_bits_per_key"])]
+    no_filter: bool,
+    /// No moments of points: scans are aligned by overlap alone
+    #[arg(long)]
+    no_moments: bool,
+}
+
+impl Map {
+    pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
+        let mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
+        let mut mapper = mapper.recovering(!self.no_recovery);
+        let filter = self.points.filter().map_err(CliError::usage)?;
+        let files = scan_files(&self.scans)?;
+        let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
+        self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
+
+        let mut run = Run::new(&self, truth, &files);
+        let output = output.with_bar(files.len());
+        output.say(run.head())?;
+        for (k, file) in files.iter().enumerate() {
+            let points = usable_points(file, &filter)?;
+            let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
+            output.print(&run.note(k, file, &mapped))?;
+            output.step();
+        }
+        output.clear_bar();
+        self.write_results(&mapper, &run)?;
+        let summary = run.summary(&mapper);
+        // Programs get only the scans, unless they ask for what is in the summary.
+        match output.is_json() && self.truth.is_none() && self.lookup.is_none() {
+            true => Ok(()),
+            false => output.print(&summary),
+        }
+    }
+
+    fn map_settings(&self) -> MapSettings {
+        let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
+        MapSettings {
+            filter: (!self.no_filter).then_some(filter),
+            moments: !self.no_moments,
+            ..MapSettings::new(self.resolution, self.levels)
+        }
+    }
+
+    fn alignment_settings(&self) -> Result<AlignmentSettings, CliError> {
+        let defaults = AlignmentSettings::default();
+        let settings = AlignmentSettings {
+            method: self.alignment.method().unwrap_or(defaults.method),
+            overlap_min: self.min_overlap.unwrap_or(defaults.overlap_min),
+            lookup: self.lookup.unwrap_or(defaults.lookup),
+            ..defaults
+        };
+        settings.checked().map_err(CliError::usage)
+    }
+
+    fn write_results(&self, mapper: &Mapper, run: &Run) -> Result<(), CliError> {
+        if let Some(path) = &self.trajectory_out {
+            write_trajectory(path, &run.trajectory).map_err(CliError::writing(path))?;
+        }
+        if let Some(path) = &self.out {
+            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk::default(), path)?;
+        }
+        Ok(())
+    }
+}
+
+/// State of a run.
+struct Run {
+    first_pose: Option<Pose>,
+    at_truth: bool,
+    truth: Option<TruthErrors>,
+    trajectory: Vec<StampedPose>,
+    scans: usize,
+    false_positives: FalsePositives,
+    name_width: usize,
+    start: Instant,
+}
+
+impl Run {
+    fn new(options: &Map, truth: Option<Vec<Pose>>, files: &[PathBuf]) -> Self {
+        Self {
+            first_pose: options.first_pose,
+            at_truth: options.at_truth,
+            truth: truth.map(TruthErrors::new),
+            trajectory: Vec::new(),
+            scans: 0,
+            false_positives: FalsePositives::default(),
+            name_width: crate::cli::scan_report::name_width(files),
+            start: Instant::now(),
+        }
+    }
+
+    fn head(&self) -> String {
+        ScanLine::head(self.name_width, self.truth.is_some())
+    }
+
+    /// Known pose of scan `k`, map_from_sensor, if there is one.
+    fn guess(&self, k: usize) -> Option<Pose> {
+        let truth = self.truth.as_ref().filter(|_| self.at_truth);
+        truth.map(|truth| truth.pose(k)).or(self.first_pose.filter(|_| k == 0))
+    }
+
+    /// Records the result of scan `k`; returns its line.
+    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped) -> ScanLine {
+        self.scans += 1;
+        self.false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
+        let map_from_sensor = mapped.alignment.map_from_sensor;
+        let accepted = mapped.accepted();
+        if accepted {
+            self.trajectory.push(StampedPose { id: k as f64, map_from_sensor });
+        }
+        let error = self.truth.as_mut().filter(|_| accepted).map(|truth| truth.add(k, &map_from_sensor));
+        ScanLine::of(name_of(file), mapped, error, self.name_width)
+    }
+
+    fn summary(&self, mapper: &Mapper) -> Summary {
+        Summary {
+            scans: self.scans,
+            accepted: self.trajectory.len(),
+            refused: self.scans - self.trajectory.len(),
+            voxels: mapper.map().voxels(0),
+            resolution_m: mapper.map().settings().resolution_m,
+            levels: mapper.map().settings().levels,
+            seconds: self.start.elapsed().as_secs_f64(),
+            error: self.truth.as_ref().and_then(TruthErrors::summary),
+            filter: mapper.asks_filters().then(|| self.false_positives.summary(mapper.false_positive_rate())),
+        }
+    }
+}
+
+/// Reads the points of a scan that are finite and pass the filter.
+fn usable_points(file: &Path, filter: &PointFilter) -> Result<Vec<Point>, CliError> {
+    let mut points = read_points(file)?;
+    let all = points.len();
+    points.retain(|point| point.is_finite());
+    let finite = points.len();
+    points.retain(|&point| filter.keeps(point));
+    match (all, finite, points.len()) {
+        (0, ..) => Err(in_file(file, "no point in this file")),
+        (_, 0, _) => {
+            Err(in_file(file, format!("none of its {all} points is finite: nothing but no-returns")))
+        }
+        (.., 0) => {
+            let problem = format!("none of its {finite} points passes --range-min, --range-max and --body");
+            Err(in_file(file, problem))
+        }
+        _ => Ok(points),
+    }
+}
+
+fn in_file(file: &Path, problem: impl std::fmt::Display) -> CliError {
+    CliError::failed(format!("{}: {problem}", file.display()))
+}
+
+/// Checks that the folder of an output file exists, so that a long run does not fail at its end.
+fn check_folder(path: &Path) -> Result<(), CliError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match folder.is_dir() {
+        true => Ok(()),
+        false => Err(in_file(path, format!("there is no folder {}: make it first", folder.display()))),
+    }
+}

@@ -1,0 +1,18 @@
+//! All routes of HTTP.
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+
+use super::adapter::Adapter;
+use super::middleware::Http;
+use super::routes;
+use super::scrapes::Scrapes;
+use crate::middleware::Middleware;
+
+/// All routes. Bodies of more than `message_bytes_max` are refused.
+pub fn router(middleware: &Middleware, message_bytes_max: usize) -> Router {
+    let (admission, metrics) = (middleware.admission().clone(), middleware.recorder().metrics().clone());
+    let scrapes = Scrapes::new(admission.scrape_kept());
+    let routes = routes::of_operations().layer(DefaultBodyLimit::max(message_bytes_max));
+    middleware.wrap(Http, routes).with_state(Adapter { admission, metrics, message_bytes_max, scrapes })
+}

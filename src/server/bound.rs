@@ -1,0 +1,261 @@
+//! A server that is bound to its addresses: it answers, and goes down within a bound.
+
+use super::error::ServerError;
+use super::files::ReloadableFiles;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::pin::pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::task::{JoinError, JoinSet};
+use tokio::time::{sleep, timeout};
+
+use super::background::keep_house;
+use super::endpoint::Endpoint;
+use super::files::Warnings;
+use super::listener::{Accepting, TcpSocket};
+use super::protocol::Protocol;
+use super::socket::UnixSocket;
+use super::starting::{CLOSING_MAX, Starting};
+use super::system_readings::SystemGauges;
+use super::tls::Tls;
+use super::watch::{measure, watch};
+use super::{access_policy, rlimit};
+use crate::access::{Access, Gate};
+use crate::admission::{Admission, Lifecycle};
+use crate::config::Config;
+use crate::middleware::Middleware;
+use crate::telemetry::{Audit, Metrics, RequestRecorder};
+use crate::{grpc, http};
+use mrol_service::{Gauges, MapService, Observer, ServiceSettings};
+use mrol_store::OpeningProgress;
+
+/// The least time for saving the maps at the end: also who waits for no request wants them saved.
+const SAVING_MIN: Duration = Duration::from_secs(5);
+
+/// How long the end of the process may take once everything has been waited for.
+const ENDING_MAX: Duration = Duration::from_secs(5);
+
+/// A server that is bound to its addresses and not yet answering.
+#[derive(Debug)]
+pub struct Server {
+    config: Config,
+    access: Access,
+    tls: Option<Tls>,
+    service: MapService,
+    recorder: RequestRecorder,
+    lifecycle: Lifecycle,
+    http: TcpSocket,
+    grpc: TcpSocket,
+    http_socket: Option<UnixSocket>,
+    grpc_socket: Option<UnixSocket>,
+}
+
+impl Server {
+    /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come. Unix sockets
+    /// are made when that is done. Dropped before, it stops opening maps.
+    ///
+    /// # Errors
+    /// When the data folder, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
+    /// and an address can be reached from elsewhere, unless the settings allow that.
+    pub async fn bind(config: Config) -> Result<Self, ServerError> {
+        let gauges = SystemGauges { data_dir: config.service_settings().data_dir };
+        Self::bind_with(config, Arc::new(gauges)).await
+    }
+
+    /// [`Server::bind`], with other gauges of disk and memory than the system's.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn bind_with(config: Config, gauges: Arc<dyn Gauges>) -> Result<Self, ServerError> {
+        let allowed_bytes = gauges.memory().map(|memory| memory.allowed_bytes);
+        let limits = rlimit::within_allowed(config.limits).within_memory(allowed_bytes);
+        let config = Config { limits, ..config };
+        let (access, tls) = (access_policy::access(&config)?, Tls::of(&config.tls)?);
+        let (metrics, audit) = (Metrics::new()?, Audit::default());
+        let observers: Vec<Arc<dyn Observer>> = vec![Arc::new(metrics.clone()), Arc::new(audit.clone())];
+        let settings = ServiceSettings { gauges: Some(gauges), observers, ..config.service_settings() };
+        let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
+        let progress = Arc::new(OpeningProgress::default());
+        tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
+        let routes = http::starting(Arc::clone(&progress), access.clone());
+        let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
+        let _until_open = CancelOpening(Arc::clone(&progress));
+        let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
+        starting.end().await;
+        let service = opened
+            .map_err(|panic| ServerError::Stopped("opening the maps", panic.to_string()))?
+            .map_err(ServerError::Open)?;
+        Ok(Self {
+            service,
+            recorder: RequestRecorder::new(metrics, audit),
+            access,
+            tls,
+            lifecycle: Lifecycle::default(),
+            http,
+            grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
+            http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
+            grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
+            config,
+        })
+    }
+
+    /// Where HTTP is served.
+    pub fn http_address(&self) -> SocketAddr {
+        self.http.address
+    }
+
+    /// Where gRPC is served.
+    pub fn grpc_address(&self) -> SocketAddr {
+        self.grpc.address
+    }
+
+    /// The file of the Unix socket where HTTP is served, if there is one.
+    pub fn http_socket(&self) -> Option<&Path> {
+        self.http_socket.as_ref().map(|socket| socket.file.path())
+    }
+
+    /// The file of the Unix socket where gRPC is served, if there is one.
+    pub fn grpc_socket(&self) -> Option<&Path> {
+        self.grpc_socket.as_ref().map(|socket| socket.file.path())
+    }
+
+    /// True where TCP connections are secured.
+    pub fn is_secured(&self) -> bool {
+        self.tls.is_some()
+    }
+
+    /// The files that are read again while it runs.
+    pub fn files(&self) -> ReloadableFiles {
+        let warnings = Warnings {
+            keys: self.config.access.expiry_warning(),
+            certificates: self.config.tls.expiry_warning(),
+        };
+        ReloadableFiles::new(self.access.clone(), self.tls.clone(), self.recorder.metrics().clone(), warnings)
+    }
+
+    /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
+    /// is in flight, its connections, saving, and a while for what comes after.
+    pub fn down_within(&self) -> Duration {
+        let config = &self.config;
+        let waited = config.drain_delay().saturating_add(config.drain()).saturating_add(saving_max(config));
+        waited.saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
+    }
+
+    /// Serves until `shutdown`, then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
+    /// `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
+    /// saved.
+    ///
+    /// Idle and half-open connections do not keep it from going down: after their requests connections have
+    /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.
+    ///
+    /// # Errors
+    /// When a listener stops by itself, or the maps cannot be saved at the end, or not in time: a disk may hang. A thread
+    /// of the runtime is then in its hands, so that the runtime has to be left behind
+    /// ([`tokio::runtime::Runtime::shutdown_background`]).
+    pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
+        let Self { config, access, tls, service, recorder, lifecycle, .. } = &self;
+        let metrics = recorder.metrics().clone();
+        let bytes_max = config.limits.message_bytes_max;
+        let gate = Gate::new(access.clone(), service.clone());
+        let admission = Admission::new(&config.limits, lifecycle.clone());
+        let middleware = Middleware::new(gate, admission.clone(), recorder.clone());
+        let (routes, health) = grpc::routes(&middleware, bytes_max)?;
+        let router = http::router(&middleware, bytes_max);
+        let endpoint =
+            |protocol, router| Endpoint::new(protocol, router, tls.clone(), &config.limits, metrics.clone());
+        let grpc = endpoint(Protocol::Grpc, routes.into_axum_router());
+        let http = endpoint(Protocol::Http, router);
+
+        let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
+        let files = self.files();
+        let mut shutdown = pin!(shutdown);
+        tokio::select! {
+            () = measure(&service, &metrics) => {}
+            () = &mut shutdown => {
+                tracing::info!("told to end before it served: ends");
+                return Ok(());
+            }
+        }
+        let mut accepting = self.accept(&grpc, &http);
+        let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
+        let looking = tokio::spawn(files.look_after(lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
+        health.set_serving().await;
+
+        let ended = tokio::select! {
+            () = &mut shutdown => Ok(()),
+            stopped = accepting.join_next() => stopped.map_or(Ok(()), |end| Err(stopped_by_itself(end))),
+        };
+
+        health.set_not_serving().await;
+        lifecycle.leave();
+        if ended.is_ok() && config.drain_delay_s > 0 {
+            tracing::info!(
+                drain_delay_s = config.drain_delay_s,
+                "told to end: not ready any more, and serving on"
+            );
+            sleep(config.drain_delay()).await;
+        }
+        tracing::info!(drain_seconds = config.drain_seconds, "draining");
+        lifecycle.drain();
+        grpc.close();
+        if timeout(config.drain(), lifecycle.idle()).await.is_err() {
+            tracing::warn!(drain_seconds = config.drain_seconds, "requests in flight are cut");
+        }
+        lifecycle.cut();
+        http.close();
+        if timeout(CLOSING_MAX, async { tokio::join!(grpc.closed(), http.closed()) }).await.is_err() {
+            grpc.cut();
+            http.cut();
+        }
+        // A file system that hangs does not keep the server from ending.
+        looking.abort();
+        let saving = async {
+            // They end by themselves when draining begins; waiting keeps the last saving of the one apart from this.
+            let _ended = tokio::join!(housekeeping, watching);
+            service.save().await
+        };
+        let most = saving_max(&config);
+        let saved = timeout(most, saving).await;
+        let maps = saved.map_err(|_| ServerError::SavingTooLong(most))?.map_err(ServerError::Save)?;
+        tracing::info!(maps, "saved, ending");
+        ended
+    }
+
+    /// Takes connections from now on, at every socket.
+    fn accept(self, grpc: &Endpoint, http: &Endpoint) -> JoinSet<()> {
+        tracing::info!(http = %self.http.address, grpc = %self.grpc.address, "serving");
+        let mut accepting = JoinSet::new();
+        for (endpoint, tcp, unix) in
+            [(grpc, self.grpc, self.grpc_socket), (http, self.http, self.http_socket)]
+        {
+            accepting.spawn(endpoint.clone().accept(Accepting::Tcp(tcp.listener)));
+            if let Some(socket) = unix {
+                tracing::info!(protocol = endpoint.protocol.as_str(), socket = %socket.file.path().display(), "serving");
+                accepting.spawn(endpoint.clone().accept(Accepting::Unix(socket)));
+            }
+        }
+        accepting
+    }
+}
+
+/// Ends the opening of maps that nobody waits for any more.
+struct CancelOpening(Arc<OpeningProgress>);
+
+impl Drop for CancelOpening {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}
+
+/// How long saving the maps may take when the server goes down.
+fn saving_max(config: &Config) -> Duration {
+    config.drain().max(SAVING_MIN)
+}
+
+fn stopped_by_itself(end: Result<(), JoinError>) -> ServerError {
+    let why = end.map_or_else(|panic| panic.to_string(), |()| "without a reason".into());
+    ServerError::Stopped("a listener", why)
+}
