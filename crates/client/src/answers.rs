@@ -5,7 +5,7 @@ use std::task::{Context, Poll};
 
 use tokio_stream::{Stream, StreamExt};
 
-use super::ClientError;
+use super::error::ClientError;
 
 /// The answers to a stream of requests, in order. After an error comes no other answer.
 pub struct Answers<T>(Pin<Box<dyn Stream<Item = Result<T, ClientError>> + Send>>);

@@ -8,9 +8,9 @@ use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Response, Status, Streaming};
 
-use super::credentials::ShownKey;
-use super::error::root_cause;
-use super::{Answers, ClientError, Credentials};
+use super::answers::Answers;
+use super::credentials::{Credentials, ShownKey};
+use super::error::{ClientError, root_cause};
 use crate::wire::{pb, transport};
 use mrol_service::ServiceError;
 use pb::mapping_client::MappingClient;

@@ -7,7 +7,7 @@ use tonic::service::Interceptor;
 use tonic::transport::{Certificate, ClientTlsConfig, Identity};
 use tonic::{Request, Status};
 
-use super::ClientError;
+use super::error::ClientError;
 
 /// Credentials of a client: the key and certificate that it shows, and the certificate authorities that it trusts. By
 /// default it shows nothing and trusts those of the system.

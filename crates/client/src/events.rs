@@ -1,6 +1,8 @@
 //! What became of the scans that robots sent.
 
-use super::{Answers, Client, ClientError};
+use super::answers::Answers;
+use super::client::Client;
+use super::error::ClientError;
 use crate::wire::pb;
 use mrol_map::map::MapName;
 use mrol_service::{EventMessage, EventsQuery, ScanEvent};

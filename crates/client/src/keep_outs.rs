@@ -1,6 +1,7 @@
 //! Keep-outs: putting, removing and listing them.
 
-use super::{Client, ClientError};
+use super::client::Client;
+use super::error::ClientError;
 use crate::wire::pb;
 use mrol_map::map::MapName;
 use mrol_service::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};

@@ -2,7 +2,9 @@
 
 use tokio_stream::{Stream, StreamExt};
 
-use super::{Answers, Client, ClientError};
+use super::answers::Answers;
+use super::client::Client;
+use super::error::ClientError;
 use crate::wire::pb;
 use mrol_map::map::MapName;
 use mrol_service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError};

@@ -70,7 +70,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::Scene;
+    use crate::scene::Scene;
     use mrol_map::geometry::{Point, pose_difference};
 
     const STEPS: usize = 300;

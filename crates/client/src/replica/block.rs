@@ -1,6 +1,8 @@
 //! Blocks out of a replica.
 
-use super::{Copied, Replica, ReplicaError, check_level};
+use super::copy::Copied;
+use super::error::ReplicaError;
+use super::handle::{Replica, check_level};
 use mrol_map::map::CellBox;
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::Lattice;

@@ -4,7 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use uuid::Uuid;
 
-use super::{ReplicaError, ReplicaOptions};
+use super::error::ReplicaError;
+use super::options::ReplicaOptions;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::Pose;
 use mrol_map::map::{

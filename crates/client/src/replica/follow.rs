@@ -7,9 +7,14 @@ use parking_lot::RwLock;
 use rand::RngExt;
 use tokio::sync::watch;
 
-use super::copy::{Applied, Builder, Copied};
-use super::{ReplicaError, ReplicaOptions, ReplicaStatus, Shared};
-use crate::{Answers, Client, ClientError};
+use super::copy::{Applied, Builder};
+use super::error::ReplicaError;
+use super::options::ReplicaOptions;
+use super::shared::Shared;
+use super::status::ReplicaStatus;
+use crate::answers::Answers;
+use crate::client::Client;
+use crate::error::ClientError;
 use mrol_map::map::MapName;
 use mrol_service::{WatchForm, WatchMessage, WatchRequest, WatchedSince};
 
@@ -144,27 +149,5 @@ impl Follower {
         let share = rand::rng().random_range(0.5..=1.0);
         tokio::time::sleep(self.pause.mul_f64(share)).await;
         self.pause = (2 * self.pause).min(PAUSE_MAX);
-    }
-}
-
-impl Shared {
-    fn tell(&self, change: impl FnOnce(&mut ReplicaStatus)) {
-        self.status.send_modify(change);
-    }
-
-    /// Shows readers what a message did.
-    fn take(&self, applied: Applied, head_revision: u64) {
-        let is_reset = matches!(applied, Applied::Replaced(_));
-        if let Applied::Replaced(copied) = applied {
-            *self.copied.write() = copied;
-        }
-        let Copied { map, map_uuid, .. } = self.copied.read().clone();
-        let version = map.content_version();
-        self.tell(|status| {
-            status.resets += u64::from(is_reset);
-            (status.map_uuid, status.version) = (map_uuid, version);
-            status.head_revision = head_revision.max(version.revision);
-            (status.is_connected, status.last_error) = (true, None);
-        });
     }
 }

@@ -1,6 +1,8 @@
 //! Questions of planners, answered by the copy.
 
-use super::{Copied, Replica, ReplicaError, check_level};
+use super::copy::Copied;
+use super::error::ReplicaError;
+use super::handle::{Replica, check_level};
 use mrol_map::util::StopSignal;
 use mrol_service::{
     Answered, Asked, KnownPart, Limits, MapVersion, Question, QuestionedMap, Reason, ServiceError,

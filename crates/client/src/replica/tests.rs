@@ -8,7 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::copy::Builder;
-use super::{ReplicaError, ReplicaOptions};
+use super::error::ReplicaError;
+use super::options::ReplicaOptions;
 use crate::wire::pb;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{

@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU8;
 
-use super::types::count_from;
-use super::{pb, required};
+use super::pb;
+use super::values::{count_from, required};
 use mrol_map::map::{DistanceBlock, MapName, Region};
 use mrol_service::{BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Reason, ServiceError};
 

@@ -1,8 +1,8 @@
 //! Deletions (`mapping.proto`).
 
 use super::occupancy::keys_from;
-use super::types::{count_from, request_id_from, text_of};
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, count_from, request_id_from, required, text_of};
 use mrol_map::map::{MapName, Region};
 use mrol_service::{Deletion, DeletionAnswer, DeletionTarget, NotSeenSince, ServiceError};
 

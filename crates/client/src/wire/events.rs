@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::types::count_from;
-use super::{InField, pb, required, status_code};
+use super::failure::status_code;
+use super::pb;
+use super::values::{InField, count_from, required};
 use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_service::{
     EventMessage, EventsQuery, FailedScan, PointCloud, Reason, ScanAnswer, ScanEvent, ServiceError,

@@ -1,7 +1,7 @@
 //! Keep-outs (`keep_out.proto`).
 
-use super::types::{request_id_from, text_of};
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, request_id_from, required, text_of};
 use mrol_map::map::{
     CallerName, KeepOut, KeepOutAct, KeepOutChange, KeepOutName, KeepOutShape, MapName, Prism, Region,
 };

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use super::pb;
 use super::scan::verdict_from;
-use super::types::count_from;
-use super::{InField, pb, required};
+use super::values::{InField, count_from, required};
 use mrol_map::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use mrol_map::map::MapName;
 use mrol_service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, ServiceError};

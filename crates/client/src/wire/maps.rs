@@ -2,9 +2,9 @@
 
 use std::time::{Duration, SystemTime};
 
+use super::pb;
 use super::scan::verdict_from;
-use super::types::count_from;
-use super::{InField, pb, required};
+use super::values::{InField, count_from, required};
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{FilterInfo, LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
 use mrol_map::mapping::Sighting;

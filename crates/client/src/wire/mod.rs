@@ -4,13 +4,11 @@
 //! back, so that the daemon and the client share one definition. What cannot be converted is an error that
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
-mod array;
 mod block;
 pub mod codec;
 mod deletion;
 mod events;
 mod failure;
-mod field;
 mod keep_out;
 mod localization;
 mod map_file;
@@ -22,18 +20,16 @@ mod question;
 mod scan;
 mod trajectory;
 pub mod transport;
-mod types;
 mod undo;
+mod values;
 mod watch;
 
-pub use array::{bitmap_of, bytes_of};
 pub use codec::{IGNORED_MAX, LINKS_MAX};
 pub use failure::{REASON, status_code, status_of};
-pub use field::{InField, required};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::{create_map, nanoseconds};
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
 pub use question::{QuestionMessage, check_body, question_of};
 pub use scan::gravity_in_sensor;
-pub use types::uuid_from;
+pub use values::{InField, bitmap_of, bytes_of, required, uuid_from};
 pub use watch::framed;

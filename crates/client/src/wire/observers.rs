@@ -1,6 +1,7 @@
 //! The scans that touched a voxel (`occupancy.proto`).
 
-use super::{pb, required};
+use super::pb;
+use super::values::required;
 use mrol_map::geometry::Point;
 use mrol_map::map::MapName;
 use mrol_map::voxel::VoxelKey;

@@ -1,7 +1,7 @@
 //! Point queries and voxel listings (`occupancy.proto`).
 
-use super::types::{count_from, lookup_from};
-use super::{InField, pb, required, uuid_from};
+use super::pb;
+use super::values::{InField, count_from, lookup_from, required, uuid_from};
 use mrol_map::geometry::Pose;
 use mrol_map::map::{Frustum, MapName, Region, VoxelSelection};
 use mrol_map::voxel::VoxelKey;

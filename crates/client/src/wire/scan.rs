@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::types::count_from;
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, count_from, required};
 use mrol_map::align::localize::{Gravity, MAP_DOWN};
 use mrol_map::align::{Direction, Method, PoseCovariance, Verdict};
 use mrol_map::map::{MapName, RobotName, SessionName};

@@ -1,7 +1,7 @@
 //! Trajectories (`mapping.proto`).
 
-use super::types::count_from;
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, count_from, required};
 use mrol_map::map::{MapName, MappedScan, RobotName, SessionName};
 use mrol_service::{ServiceError, TrajectoryAnswer, TrajectoryQuery};
 

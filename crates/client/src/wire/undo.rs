@@ -1,7 +1,7 @@
 //! Undoing scans and deletions (`mapping.proto`).
 
-use super::types::{count_from, request_id_from, text_of};
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, count_from, request_id_from, required, text_of};
 use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_service::{ServiceError, Undo, UndoAnswer, UndoTarget};
 

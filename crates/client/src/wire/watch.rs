@@ -2,9 +2,8 @@
 
 use prost::bytes::{BufMut, Bytes, BytesMut};
 
-use super::types::count_from;
-use super::types::uuid_from;
-use super::{InField, pb, required};
+use super::pb;
+use super::values::{InField, count_from, required, uuid_from};
 use mrol_map::map::{ContentHash, ContentVersion, MapName, RobotName, SessionName};
 use mrol_service::{
     BlockBytes, Cause, ChangePart, LeftViewpoint, Reason, ServiceError, StatePart, WatchEvent, WatchForm,

@@ -2,7 +2,7 @@
 
 use axum::http::HeaderValue;
 
-use super::FleetError;
+use super::error::FleetError;
 use mrol_client::{Client, Credentials};
 
 /// The gRPC address of a server.

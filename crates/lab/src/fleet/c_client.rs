@@ -6,8 +6,8 @@ use std::process::Stdio;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
 use tokio::process::{Child, ChildStdin, ChildStdout, Command};
 
-use super::FleetError;
 use super::address::GrpcAddress;
+use super::error::FleetError;
 use super::memory::resident_bytes;
 use crate::workload::Queries;
 use mrol_map::geometry::{rotation_xyzw, translation_m};

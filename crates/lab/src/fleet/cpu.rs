@@ -1,6 +1,6 @@
 //! Processor time of a process.
 
-use super::FleetError;
+use super::error::FleetError;
 
 /// Clock ticks a second in what Linux tells programs of processor time, on every machine.
 const TICKS_PER_S: f64 = 100.0;

@@ -7,8 +7,8 @@ use hyper_util::client::legacy::Client;
 use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::TokioExecutor;
 
-use super::FleetError;
 use super::address::HttpAddress;
+use super::error::FleetError;
 use mrol_service::PointCloud;
 
 /// Most bytes of an answer: a bit a point, or an error's text.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use parking_lot::Mutex;
 
-use super::FleetError;
+use super::error::FleetError;
 use super::tally::Tally;
 use mrol_map::map::ContentHash;
 use mrol_service::MapVersion;

@@ -10,8 +10,8 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
+use super::error::FleetError;
 use super::http::HttpConnection;
 use crate::workload::Queries;
 use mrol_map::geometry::{Pose, rotation_xyzw, translation_m};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
 
-use super::FleetError;
+use super::error::FleetError;
 use super::pace::Pace;
 use super::tally::Tally;
 

@@ -1,6 +1,6 @@
 //! Memory of a process, and its trend.
 
-use super::FleetError;
+use super::error::FleetError;
 
 /// Resident memory of a process, bytes, as Linux reports it.
 pub(crate) fn resident_bytes(pid: u32) -> Result<u64, FleetError> {

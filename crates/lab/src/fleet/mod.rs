@@ -4,6 +4,7 @@
 mod address;
 mod c_client;
 mod cpu;
+mod error;
 mod http;
 mod ledger;
 mod load;
@@ -21,13 +22,9 @@ mod surveyor;
 mod tally;
 mod target;
 
-use std::fmt::Display;
-
-use mrol::server::ServerError;
-use mrol_client::ClientError;
-
 pub(crate) use address::{GrpcAddress, HttpAddress};
 pub(crate) use c_client::CClient;
+pub(crate) use error::FleetError;
 pub(crate) use ledger::Ledger;
 pub(crate) use load::{Answered, Load, Question};
 pub(crate) use member::{Fleet, Working};
@@ -41,30 +38,3 @@ pub(crate) use stalled::StalledWatch;
 pub(crate) use surveyor::Surveyor;
 pub(crate) use tally::Tally;
 pub(crate) use target::Target;
-
-/// Errors of a fleet.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum FleetError {
-    /// The server refused a request, or cannot be reached.
-    #[error(transparent)]
-    Client(#[from] ClientError),
-    /// The daemon cannot serve.
-    #[error(transparent)]
-    Server(#[from] ServerError),
-    /// The options are not valid.
-    #[error("{0}")]
-    Usage(String),
-    /// Anything else.
-    #[error("{0}")]
-    Failed(String),
-}
-
-impl FleetError {
-    fn usage(message: impl Display) -> Self {
-        Self::Usage(message.to_string())
-    }
-
-    fn failed(message: impl Display) -> Self {
-        Self::Failed(message.to_string())
-    }
-}

@@ -3,8 +3,8 @@
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::FleetError;
 use super::address::HttpAddress;
+use super::error::FleetError;
 use super::http::HttpConnection;
 use super::load::Question;
 use super::member::Member;

@@ -10,9 +10,9 @@ use tokio::io::{AsyncBufReadExt, BufReader};
 use tokio::process::{Child, Command};
 use tokio::time::timeout;
 
-use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
 use super::cpu::cpu_seconds;
+use super::error::FleetError;
 use super::memory::resident_bytes;
 
 /// Longest time for the server to end, beyond the ten seconds of its drain.

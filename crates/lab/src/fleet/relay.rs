@@ -8,8 +8,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinHandle;
 
-use super::FleetError;
 use super::address::GrpcAddress;
+use super::error::FleetError;
 
 /// Bytes that are passed on at once.
 const PIECE_BYTES: usize = 64 << 10;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::FleetError;
+use super::error::FleetError;
 use super::member::Member;
 use super::target::Target;
 use crate::workload::Queries;

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use parking_lot::Mutex;
 use tokio::task::JoinHandle;
 
-use super::FleetError;
 use super::address::GrpcAddress;
+use super::error::FleetError;
 use super::ledger::Sighting;
 use mrol_client::{Replica, ReplicaOptions, ReplicaStatus};
 use mrol_map::map::MapName;

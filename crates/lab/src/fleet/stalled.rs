@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpSocket, TcpStream};
 
-use super::FleetError;
+use super::error::FleetError;
 use mrol_map::map::MapName;
 
 /// Bytes that may lie unread at a watcher: little, so that its server has to wait soon.

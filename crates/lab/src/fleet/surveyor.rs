@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::FleetError;
 use super::address::GrpcAddress;
+use super::error::FleetError;
 use super::ledger::Ledger;
 use super::member::Member;
 use super::robot::Seen;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hdrhistogram::Histogram;
 
-use super::FleetError;
+use super::error::FleetError;
 
 /// Longest latency that is told apart: longer ones count as ten minutes, in nanoseconds.
 const LATENCY_NS_MAX: u64 = 600_000_000_000;

@@ -2,8 +2,8 @@
 
 use uuid::Uuid;
 
-use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
+use super::error::FleetError;
 use crate::workload::Workload;
 use mrol_client::{Client, NewMap};
 use mrol_map::geometry::{Point, Pose};

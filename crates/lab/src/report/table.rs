@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
-use super::ReportError;
+use super::error::ReportError;
 
 /// A table of text cells: rows under a head.
 pub struct Table {

@@ -1,6 +1,6 @@
 //! A hash set of packed keys: the paper's "de facto method".
 
-use super::{Structure, occupied_by_key, voxels};
+use super::structure::{Structure, occupied_by_key, voxels};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
 use mrol_map::voxel::{Lattice, VoxelKey};

@@ -1,12 +1,11 @@
 //! Hash tables of packed keys, one for each level: the map of the paper's predecessor \[8\], which it compares with
 //! (IV-C).
 
-use super::count_by_key;
+use super::structure::count_by_key;
 use mrol_map::align::OccupiedVoxels;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::Lookup;
-use mrol_map::voxel::quantize;
-use mrol_map::voxel::{Lattice, VoxelKey};
+use mrol_map::voxel::{Lattice, VoxelKey, quantize};
 
 /// A map of hashbrown sets with their default hasher, one for each level, behind the same transform as the map of this
 /// crate.

@@ -1,6 +1,6 @@
 //! The structures of this crate's map.
 
-use super::Structure;
+use super::structure::Structure;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::lookup::{self, Lookup};
 use mrol_map::map::{MapView, MultiResolutionMap};

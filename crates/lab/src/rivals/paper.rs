@@ -1,6 +1,6 @@
 //! The paper's own counting Bloom filter (IV).
 
-use super::{Structure, occupied_by_key, voxels};
+use super::structure::{Structure, occupied_by_key, voxels};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
 use mrol_map::voxel::Lattice;
@@ -65,7 +65,7 @@ impl Structure for PaperFilter {
 mod tests {
     use super::COUNTERS;
     use crate::measure::lookup::compare;
-    use crate::rivals::StructureName;
+    use crate::rivals::structure_name::StructureName;
     use crate::workload::{Order, Scatter, Workload};
     use mrol_map::bloom::ideal_false_positive_rate;
     use mrol_map::map::MapSettings;

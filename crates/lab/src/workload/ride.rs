@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::Queries;
+use super::queries::Queries;
 use mrol_map::geometry::{Pose, translation_m};
 use mrol_simulate::gaussian;
 

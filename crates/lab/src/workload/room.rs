@@ -4,7 +4,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::Queries;
+use super::queries::Queries;
 use super::ride::{Sight, Surface};
 use mrol_map::geometry::Pose;
 use mrol_map::voxel::{VoxelKey, VoxelSet};

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Queries;
+use super::queries::Queries;
 use mrol_map::geometry::Pose;
 use mrol_map::voxel::{VoxelKey, VoxelSet};
 

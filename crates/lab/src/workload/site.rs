@@ -6,7 +6,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Queries;
+use super::queries::Queries;
 use super::ride::{Sight, Surface};
 use mrol_map::geometry::Pose;
 use mrol_map::voxel::{VoxelKey, VoxelSet};

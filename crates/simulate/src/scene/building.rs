@@ -12,8 +12,11 @@
 //!     0         6.5 7            14   x
 //! ```
 
+use super::object::Object;
 use super::shape::Shape;
-use super::{CEILING_M, Object};
+
+/// Height of the ceiling, meters.
+pub(super) const CEILING_M: f64 = 2.7;
 
 const LENGTH_M: f64 = 14.0;
 const WIDTH_M: f64 = 9.0;

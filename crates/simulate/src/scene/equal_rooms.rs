@@ -3,8 +3,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::building::CEILING_M;
+use super::object::Object;
 use super::shape::Shape;
-use super::{CEILING_M, Object};
 
 const LENGTH_M: f64 = 7.0;
 const WIDTH_M: f64 = 5.0;

@@ -5,9 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Object;
 use super::building::{ARCHIVE, CORRIDOR, LOUNGE, Room, STUDY, WORKSHOP};
 use super::furniture::Kind;
+use super::object::Object;
 use crate::route::{CAMERA_ROUTE, LIDAR_ROUTE, Route};
 
 /// Least distance of furniture from the robots' routes, meters.

@@ -5,8 +5,9 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::building::CEILING_M;
+use super::object::Object;
 use super::shape::Shape;
-use super::{CEILING_M, Object};
 
 /// Kinds of furniture.
 #[derive(Debug, Clone, Copy)]

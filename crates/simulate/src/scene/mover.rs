@@ -1,7 +1,8 @@
 //! Things that do not stay: a box that is taken away, a person who walks.
 
+use super::object::Object;
 use super::shape::Shape;
-use super::{Object, Scene};
+use super::simulated_scene::Scene;
 
 /// A thing in a scene that is not there for ever, or not always at the same place.
 #[derive(Debug, Clone)]

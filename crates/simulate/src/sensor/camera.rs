@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::{cast, drops_out, gaussian, point};
-use crate::Scene;
+use super::beam::{cast, drops_out, gaussian, point};
+use crate::scene::Scene;
 use mrol_map::geometry::{Point, Pose};
 
 /// A depth camera; its frame has x to the right, y down and z forward.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::{cast, drops_out, gaussian, point};
-use crate::Scene;
+use super::beam::{cast, drops_out, gaussian, point};
+use crate::scene::Scene;
 use mrol_map::geometry::{Point, Pose};
 
 /// A spinning lidar; its frame has x forward, y to the left and z up.

@@ -2,7 +2,7 @@
 
 use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, skip_field};
 
-use super::TooMany;
+use super::too_many::TooMany;
 
 /// A message that has lists of which the elements are counted, or messages with such lists.
 #[derive(Debug)]

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
+use tonic::Status;
 
-use super::most::elements_max;
-use super::*;
+use super::elements;
+use super::most::{LINKS_MAX, elements_max};
+use super::too_many::TooMany;
 use crate::wire::pb;
 
 /// The contract: its messages by name, and which of them are requests and answers.

@@ -3,9 +3,8 @@
 use bytes::Bytes;
 
 use super::keep_outs::{keep_outs_from, keep_outs_of};
-use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
-use crate::wire::types::count_from;
-use crate::wire::{InField, pb};
+use crate::wire::pb;
+use crate::wire::values::{InField, bitmap_of, bytes_of, count_from, numbers_of, voxels_of, words_of};
 use mrol_map::map::Region;
 use mrol_map::planning::{Body, Clearance, Hit, Link, Met, NUMBERS_PER_POSE, Sphere, Surroundings, Unknown};
 use mrol_map::voxel::VoxelKey;

@@ -1,9 +1,8 @@
 //! Points as what is known of them.
 
-use super::{Of, answered, asked_of};
-use crate::wire::array::{bitmap_of, words_of};
-use crate::wire::types::count_from;
-use crate::wire::{InField, pb, required};
+use super::asked::{Of, answered, asked_of};
+use crate::wire::pb;
+use crate::wire::values::{InField, bitmap_of, count_from, required, words_of};
 use mrol_map::map::MapName;
 use mrol_map::planning::PointStates;
 use mrol_service::{Answered, ClassifyQuestion, ServiceError};

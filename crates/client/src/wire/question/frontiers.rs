@@ -1,8 +1,8 @@
 //! Frontiers.
 
-use super::{Of, answered, asked_of};
-use crate::wire::types::count_from;
-use crate::wire::{InField, pb, required};
+use super::asked::{Of, answered, asked_of};
+use crate::wire::pb;
+use crate::wire::values::{InField, count_from, required};
 use mrol_map::map::MapName;
 use mrol_map::planning::{Frontier, FrontierView, Frontiers};
 use mrol_service::{Answered, FrontierQuestion, ServiceError};

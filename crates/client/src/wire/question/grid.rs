@@ -1,9 +1,8 @@
 //! The map from above.
 
-use super::{Of, answered, asked_of};
-use crate::wire::array::{bitmap_of, bytes_of, numbers_of, words_of};
+use super::asked::{Of, answered, asked_of};
 use crate::wire::pb;
-use crate::wire::types::count_from;
+use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, words_of};
 use mrol_map::map::MapName;
 use mrol_map::planning::{Grid, GridArea};
 use mrol_service::{Answered, GridQuestion, GridScope, ServiceError};

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::wire::array::{bytes_of, numbers_of};
-use crate::wire::{InField, pb};
+use crate::wire::pb;
+use crate::wire::values::{InField, bytes_of, numbers_of};
 use mrol_map::map::KeepOutName;
 use mrol_service::{Reason, ServiceError};
 

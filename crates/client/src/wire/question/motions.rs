@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
+use super::asked::{Of, answered, asked_of};
 use super::body::{configurations_from, counts_from, ignored_of, surroundings_from};
-use super::{Of, answered, asked_of};
-use crate::wire::array::{bitmap_of, bytes_of, numbers_of};
-use crate::wire::types::count_from;
-use crate::wire::{pb, required};
+use crate::wire::pb;
+use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, required};
 use mrol_map::map::MapName;
 use mrol_map::planning::MotionAnswer;
 use mrol_service::{Answered, MotionCheck, ServiceError};

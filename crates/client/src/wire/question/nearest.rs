@@ -1,10 +1,11 @@
 //! The nearest voxel of points.
 
+use super::asked::{Of, answered, asked_of};
 use super::keep_outs::{keep_outs_from, keep_outs_of};
-use super::{Of, answered, asked_of};
-use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
-use crate::wire::types::count_from;
-use crate::wire::{InField, pb, required};
+use crate::wire::pb;
+use crate::wire::values::{
+    InField, bitmap_of, bytes_of, count_from, numbers_of, required, voxels_of, words_of,
+};
 use mrol_map::map::MapName;
 use mrol_map::planning::{MeasuredTo, NearestVoxels};
 use mrol_service::{Answered, NearestQuestion, Reason, ServiceError};

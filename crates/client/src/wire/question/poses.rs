@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use super::asked::{Of, answered, asked_of};
 use super::body::{
     answer_from, answer_of, configurations_from, counts_from, ignored_of, spheres_bytes, spheres_from,
     surroundings_from,
 };
-use super::{Of, answered, asked_of};
-use crate::wire::array::bytes_of;
-use crate::wire::{pb, required};
+use crate::wire::pb;
+use crate::wire::values::{bytes_of, required};
 use mrol_map::map::MapName;
 use mrol_service::{Answered, Collisions, PoseCheck, ServiceError, SphereCheck};
 

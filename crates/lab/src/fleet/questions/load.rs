@@ -8,8 +8,10 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::batch::Batch;
+use crate::fleet::error::FleetError;
 use crate::fleet::pace::Pace;
-use crate::fleet::{FleetError, ServerProcess, Target};
+use crate::fleet::process::ServerProcess;
+use crate::fleet::target::Target;
 use mrol_client::Client;
 
 /// Longest latency that is told apart, nanoseconds.

@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::fleet::FleetError;
+use crate::fleet::error::FleetError;
 use crate::measure::planning::{half_colliding, meets};
 use crate::workload::Shots;
 use crate::workload::bodies::arm::{self, Hand};

@@ -3,8 +3,10 @@
 use std::time::{Duration, Instant};
 
 use super::load::Told;
+use crate::fleet::error::FleetError;
 use crate::fleet::pace::Pace;
-use crate::fleet::{FleetError, ServerProcess, Target};
+use crate::fleet::process::ServerProcess;
+use crate::fleet::target::Target;
 use crate::workload::{Order, Workload};
 use mrol_client::{Client, new_session};
 use mrol_map::geometry::Pose;

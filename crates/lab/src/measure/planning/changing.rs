@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::meets;
+use super::arms::meets;
 use crate::workload::bodies::arm::{self, Hand};
 use crate::workload::bodies::place::Surface;
 use crate::workload::{Order, Queries, Workload, add};

@@ -6,7 +6,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::meets;
+use super::arms::meets;
 use crate::measure::stopwatch::Runs;
 use crate::workload::bodies::place::{Surface, append, in_ball};
 use mrol_map::geometry::{Point, Pose};

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
+use super::drawing::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
 use crate::experiment::stages::Stage;
-use crate::report::{ReportError, Spread};
+use crate::report::error::ReportError;
+use crate::report::spread::Spread;
 
 /// Half the height of a box, pixels.
 const HALF_BOX_PX: i32 = 10;

@@ -1,34 +1,8 @@
 //! Plots as SVG.
 
 mod box_plot;
+mod drawing;
 mod panel;
-
-use std::path::Path;
-
-use plotters::prelude::*;
-
-use super::ReportError;
 
 pub use box_plot::box_plot;
 pub use panel::{Axis, Curve, Panel, Scale, Style, panels};
-
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-
-/// Width and height of one plot, pixels; panels are side by side.
-const SIZE_PX: (u32, u32) = (900, 480);
-const TITLE_PX: i32 = 18;
-const LABEL_PX: i32 = 14;
-const MARGIN_PX: i32 = 12;
-/// Colors that can be told apart with a color vision deficiency and in print.
-const COLORS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    BLACK,
-    RGBColor(86, 180, 233),
-];
-
-fn drawn(path: &Path, outcome: Outcome<()>) -> Result<(), ReportError> {
-    outcome.map_err(|error| ReportError::Draw { path: path.to_owned(), reason: error.to_string() })
-}

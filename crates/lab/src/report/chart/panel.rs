@@ -7,8 +7,8 @@ use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
-use super::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
-use crate::report::ReportError;
+use super::drawing::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
+use crate::report::error::ReportError;
 
 /// Lengths of a dash, of the gap after it, and of the piece of a curve beside its name.
 const DASH_PX: i32 = 7;

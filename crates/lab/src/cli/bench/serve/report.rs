@@ -5,7 +5,7 @@ use std::fmt::{self, Display};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::Protocol;
+use super::protocol::Protocol;
 use crate::fleet::Answered;
 use mrol::console::map_report::{count, percent};
 

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use tokio::time::sleep;
 
-use super::WatchBench;
 use super::report::{Line, Measured};
+use crate::cli::bench::workload::{MapOptions, WorkloadOptions};
 use crate::fleet::{
     ANY_PORT, Fleet, FleetError, Ledger, Seen, ServerProcess, Spectator, StalledWatch, Surveyor, TURN_POINTS,
     Tally, Target, Working,
@@ -43,16 +43,22 @@ pub(super) struct Stage {
 
 impl Stage {
     /// Starts the server and makes the map.
-    pub(super) async fn set(options: &WatchBench, data: &Path) -> Result<Self, CliError> {
+    pub(super) async fn set(
+        workload_options: &WorkloadOptions,
+        map_options: &MapOptions,
+        scan_points: u32,
+        rate: f64,
+        data: &Path,
+    ) -> Result<Self, CliError> {
         let server = ServerProcess::start_at(data, ANY_PORT, &SETTINGS).await?;
-        let workload = options.workload.workload();
-        let settings = options.map.settings(workload.resolution_m())?;
+        let workload = workload_options.workload();
+        let settings = map_options.settings(workload.resolution_m())?;
         let target = Target::make(server.grpc(), None, workload, settings).await?;
-        let turns = workload.queries(Order::Scan, TURN_POINTS * TURNS, options.workload.seed());
-        let seen = Seen::of(&turns, options.scan_points as usize);
+        let turns = workload.queries(Order::Scan, TURN_POINTS * TURNS, workload_options.seed());
+        let seen = Seen::of(&turns, scan_points as usize);
         let ledger = Arc::new(Ledger::default());
         let robot = Surveyor::new(&server.grpc(), &target.map, &seen, &ledger).await?;
-        let (data, home, rate) = (data.to_owned(), server.grpc_listen().to_owned(), options.rate);
+        let (data, home) = (data.to_owned(), server.grpc_listen().to_owned());
         let (robots, spectators) = (Some(Fleet::new(vec![robot])), Vec::new());
         Ok(Self { data, server, home, target, ledger, seen, robots, rate, spectators })
     }

@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use crate::rivals::dense::Grid;
+use crate::rivals::dense::grid::Grid;
 use mrol_map::geometry::Point;
 use mrol_map::util::cpu::Avx2;
 use mrol_map::voxel::LatticeFromPoints;

@@ -1,12 +1,8 @@
-//! Offsets of points in a dense array, with SIMD variants as of the map's own look-up, so that the rival gets the same
-//! transform.
+//! Offsets by the fastest variant that this machine runs, and the reference implementation.
 
 #[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-
-use super::Grid;
+use super::{avx2, avx512};
+use crate::rivals::dense::grid::Grid;
 use mrol_map::geometry::Point;
 #[cfg(target_arch = "x86_64")]
 use mrol_map::util::cpu::{Avx2, Avx512};

@@ -2,7 +2,8 @@
 
 use uuid::Uuid;
 
-use super::{InField, pb, required};
+use super::field::{InField, required};
+use crate::wire::pb;
 use mrol_map::geometry::{self, Point, Pose};
 use mrol_map::map::{ContentHash, Lookup, Region, RequestId};
 use mrol_service::{MapVersion, PointCloud, Reason, ServiceError};
@@ -140,7 +141,7 @@ impl From<MapVersion> for pb::MapVersion {
 }
 
 /// The lookup of an enum field's number.
-pub(super) fn lookup_from(number: i32) -> Result<Lookup, ServiceError> {
+pub(in crate::wire) fn lookup_from(number: i32) -> Result<Lookup, ServiceError> {
     match pb::Lookup::try_from(number) {
         Ok(pb::Lookup::Unspecified | pb::Lookup::Exact) => Ok(Lookup::Exact),
         Ok(pb::Lookup::Bloom) => Ok(Lookup::Bloom),
@@ -169,17 +170,17 @@ pub fn uuid_from(text: &str) -> Result<Uuid, ServiceError> {
 }
 
 /// A request's id; none where the text is empty.
-pub(super) fn request_id_from(text: &str) -> Result<Option<RequestId>, ServiceError> {
+pub(in crate::wire) fn request_id_from(text: &str) -> Result<Option<RequestId>, ServiceError> {
     Ok((!text.is_empty()).then(|| RequestId::new(text)).transpose()?)
 }
 
 /// The inverse of [`request_id_from`].
-pub(super) fn text_of(id: Option<RequestId>) -> String {
+pub(in crate::wire) fn text_of(id: Option<RequestId>) -> String {
     id.map(|id| id.to_string()).unwrap_or_default()
 }
 
 /// A count that came over the wire. Machines of less than 64 bits hold no map that would notice.
-pub(super) fn count_from(count: u64) -> usize {
+pub(in crate::wire) fn count_from(count: u64) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
 }
 
