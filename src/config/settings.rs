@@ -92,7 +92,7 @@ impl Config {
     /// A variable counts when it names a setting at the top (`MROL_DATA_DIR`) or holds the `__` between section
     /// and key (`MROL_HTTP__LISTEN`). One that would be a setting with `__` in place of `_` is refused. Others are left
     /// alone, since container platforms set names such as `MROL_SERVICE_HOST` for every service called mrol; what
-    /// nobody is known to set, [`unknown_variables`] lists.
+    /// nobody is known to set, [`unknown_variables`](super::unknown_variables) lists.
     ///
     /// # Errors
     /// For an unknown setting, a value of the wrong type or out of range, a missing file, or a misspelled variable.

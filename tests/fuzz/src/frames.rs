@@ -1,4 +1,4 @@
-//! The frames of map files and journals, made by the description of their bytes alone (`crates/store/src/snapshot`,
+//! The frames of map files and journals, made by the description of their bytes alone (`crates/store/src/snapshots`,
 //! `crates/store/src/journal/segment.rs` and `frame.rs`): what is inside them reaches the decoders with right checksums.
 
 use uuid::Uuid;

@@ -3,12 +3,8 @@
 use std::fmt::{self, Debug, Formatter};
 use std::ops::{Deref, DerefMut};
 
-#[cfg(feature = "shuttle")]
-use super::modeled as primitive;
-#[cfg(not(feature = "shuttle"))]
-use parking_lot as primitive;
-
 use super::checks::{Held, hold, may_wait};
+use super::primitive;
 use super::rank::Rank;
 
 /// A lock that one thread holds at a time.

@@ -10,24 +10,18 @@
 //! * While a [`Rank::Brief`] lock is held no other lock is taken and no file operation starts.
 //!
 //! With `debug_assertions`, so in every test, a breach panics at the line that commits it (`checks`). Without, the
-//! locks are `parking_lot`'s and cost nothing more. With the feature `shuttle`, which is for one test alone
-//! (`tests/commit_protocol.rs`), they are those of a model checker: it runs a test's threads one at a time, and at
+//! locks are `parking_lot`'s and cost nothing more. With the feature `shuttle`, which is for two tests alone
+//! (`tests/commit_protocol.rs` here, `tests/modeled.rs` of the service), they are those of a model checker: it runs a test's threads one at a time, and at
 //! every lock chooses who goes on.
 
 mod checks;
 mod locks;
-#[cfg(feature = "shuttle")]
-mod modeled;
+#[cfg_attr(feature = "shuttle", path = "modeled.rs")]
+#[cfg_attr(not(feature = "shuttle"), path = "native.rs")]
+mod primitive;
 mod rank;
 
 pub use checks::{before_file_operation, polled_by_runtime};
 pub use locks::{Mutex, MutexGuard, RwLock, RwLockReadGuard, RwLockWriteGuard};
+pub use primitive::{AtomicU64, mpsc, thread};
 pub use rank::Rank;
-#[cfg(feature = "shuttle")]
-pub use shuttle::sync::atomic::AtomicU64;
-#[cfg(feature = "shuttle")]
-pub use shuttle::{sync::mpsc, thread};
-#[cfg(not(feature = "shuttle"))]
-pub use std::sync::atomic::AtomicU64;
-#[cfg(not(feature = "shuttle"))]
-pub use std::{sync::mpsc, thread};

@@ -1,8 +1,11 @@
-//! `parking_lot`'s locks, as far as `locks` uses them, made of the model checker's.
+//! The primitives of the model checker: `parking_lot`'s locks, as far as `locks` uses them, made of its own.
 
 use std::sync::{PoisonError, TryLockError};
 
 use shuttle::sync;
+
+pub use shuttle::thread;
+pub use sync::{atomic::AtomicU64, mpsc};
 
 pub(super) use sync::{MutexGuard, RwLockReadGuard, RwLockWriteGuard};
 

@@ -81,7 +81,7 @@ fn look_up(
     scalar::occupied(points, lattice_from_points, view, lookup, occupied)
 }
 
-/// [`occupied`] as CPUs without SIMD instructions run it: the reference implementation.
+/// `occupied` as CPUs without SIMD instructions run it: the reference implementation.
 ///
 /// # Panics
 /// As there.
