@@ -23,8 +23,8 @@ use crate::voxel::{BlockMask, VoxelSet};
 /// who looks for two that do.
 ///
 /// ```
-/// use mrol::map::ContentHash;
-/// use mrol::voxel::{VoxelKey, VoxelSet};
+/// use mrol_map::map::ContentHash;
+/// use mrol_map::voxel::{VoxelKey, VoxelSet};
 ///
 /// let set: VoxelSet = [[0, 0, 0], [1, -2, 3]].into_iter().filter_map(VoxelKey::new).collect();
 /// let hash = ContentHash::of(&set);

@@ -21,10 +21,10 @@ use crate::util::StopSignal;
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
 /// ```
-/// use mrol::geometry::{Point, Pose};
-/// use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
-/// use mrol::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
-/// use mrol::util::StopSignal;
+/// use mrol_map::geometry::{Point, Pose};
+/// use mrol_map::map::{MapSettings, MultiResolutionMap, RobotName};
+/// use mrol_map::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
+/// use mrol_map::util::StopSignal;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let map = MultiResolutionMap::new(MapSettings::new(0.05, 4))?;
