@@ -1,9 +1,9 @@
 //! A copy of a map in this process, which follows the server's.
 //!
 //! ```no_run
-//! use mrol::client::{Client, Replica, ReplicaOptions};
-//! use mrol::map::MapName;
-//! use mrol::service::PointQuery;
+//! use mrol_client::{Client, Replica, ReplicaOptions};
+//! use mrol_client::map::MapName;
+//! use mrol_client::service::PointQuery;
 //!
 //! # async fn example(query: PointQuery) -> Result<(), Box<dyn std::error::Error>> {
 //! let client = Client::connect("http://127.0.0.1:7334").await?;
