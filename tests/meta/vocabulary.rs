@@ -90,13 +90,13 @@ const REPLACED: [(&str, &str); 80] = [
 /// Where an old word is the right one: an error names what a setting was called before, a workload is a room, and over the
 /// wire a pose of a trajectory is just that.
 const ALLOWED: [(&str, &str); 9] = [
-    ("src/config/mod.rs", "disk_free_back_mib"),
-    ("src/config/mod.rs", "memory_back_mib"),
+    ("src/config/settings.rs", "disk_free_back_mib"),
+    ("src/config/settings.rs", "memory_back_mib"),
     ("crates/lab/", "Room"),
     ("crates/simulate/", "Room"),
     ("src/cli/map/", "Room"),
     ("crates/client/", "TrajectoryPose"),
-    ("src/http/trajectory.rs", "TrajectoryPose"),
+    ("src/http/operations/trajectory.rs", "TrajectoryPose"),
     ("proto/mrol/v1/", "TrajectoryPose"),
     ("docs/lab-notes.md", "Around"),
 ];
