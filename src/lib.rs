@@ -1,16 +1,19 @@
 //! A networked multi-resolution voxel map: Ryde and Corso, *Fast Voxel Maps with Counting Bloom Filters*
 //! (IROS 2012), as a server.
 //!
-//! In reading order, which is also the order of the layers. Each of the first four is a crate; within a crate no two
+//! In reading order, which is also the order of the layers. The first two lines name crates; within a crate no two
 //! modules name each other, and a test says so.
 //!
 //! * [`mrol_map`], the core, knows no runtime, no protocol and no serialization. Its modules are here too: [`voxel`],
-//!   [`bloom`], [`geometry`], [`map`], [`align`], [`scan`], [`planning`] and [`mapping`]. Begin with [`mapping`] to see the
+//!   [`bloom`], [`geometry`], [`map`], [`align`], [`scan`], [`visibility`],
+//!   [`planning`], [`mapping`] and [`util`]. Begin with [`mapping`] to see the
 //!   whole before its parts: a scan enters a map, from its guess to the inserted voxels (paper III-B).
 //! * [`store`]: map files. [`service`]: the operations, once for every protocol. [`client`]: the client, its [`wire`]
 //!   format and a replica of a map.
-//! * [`access`]: the operations by name, and who may ask for each. [`grpc`], [`http`]: adapters. [`server`], [`cli`]: the
-//!   daemon and the program. [`demo`]: simulated robots that show it.
+//! * [`access`]: the operations by name, and who may ask for each. [`telemetry`]: metrics, audit, log. [`admission`]: what is
+//!   done at once is bounded. [`middleware`], [`config`]: what every request passes; settings. [`json`], [`grpc`], [`http`]:
+//!   adapters. [`server`]: the daemon. [`console`], [`demo`], [`cli`]: the program; the demonstration's robots are simulated by
+//!   the crate `mrol-simulate`.
 //!
 //! What measures and compares is a program of its own, in `crates/lab`.
 //!

@@ -10,7 +10,7 @@
 //! silent for longest gives way.
 //!
 //! Probes need no key and are answered whatever else is done, so they have limits of their own: small bodies that come at
-//! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max`), few scrapes (`scrapes_max`) and few watches
+//! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max_s`), few scrapes (`scrapes_max`) and few watches
 //! (`health_watches_max`).
 
 mod admit;

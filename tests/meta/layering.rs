@@ -246,3 +246,21 @@ fn unsafe_code_stays_in_the_kernels() {
         assert!(kernel || !has_unsafe, "{} has unsafe code", file.display());
     }
 }
+
+/// What a doorway may hold: it hands on what stands in the files beside it.
+fn is_of_doorway(item: &Item) -> bool {
+    matches!(item, Item::Mod(_) | Item::Use(_) | Item::ExternCrate(_) | Item::Macro(_))
+}
+
+#[test]
+fn doorways_hold_nothing_but_names() {
+    let mut wrong = Vec::new();
+    for Source { file, text, .. } in crates().iter().flat_map(|src| sources(src)) {
+        let is_doorway = file.ends_with("mod.rs") || file.ends_with("lib.rs");
+        let holds_more = || !syn::parse_file(&text).unwrap().items.iter().all(is_of_doorway);
+        if is_doorway && !file.components().any(|part| part.as_os_str() == "tests") && holds_more() {
+            wrong.push(file.display().to_string());
+        }
+    }
+    assert!(wrong.is_empty(), "more than documentation, mod and use:\n{}", wrong.join("\n"));
+}

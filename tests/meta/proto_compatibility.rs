@@ -2,7 +2,7 @@
 //! the same on the wire.
 //!
 //! `tests/released/mrol.v1.bin` is the descriptor set of the last release. On a release, after this test passed:
-//! `cargo test --test proto_compatibility -- --ignored`.
+//! `cargo test --test meta proto_compatibility -- --ignored`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

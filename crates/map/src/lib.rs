@@ -1,7 +1,7 @@
 //! The core of the map server: Ryde and Corso, *Fast Voxel Maps with Counting Bloom Filters* (IROS 2012).
 //!
-//! It knows no runtime, no protocol and no serialization. In reading order, which is also the order of the layers: no
-//! module names one above its own, and a test says so.
+//! It knows no runtime, no protocol and no serialization. In reading order, which is also the order of the layers but for
+//! the last line, on which all of them stand: no two modules name each other, and a test says so.
 //!
 //! * [`voxel`], [`bloom`], [`geometry`]: keys, lattice and blocks (paper II-B, III); counting Bloom filters (II-A);
 //!   points and poses.

@@ -15,7 +15,8 @@
 //! * When the journal cannot be written or synced, the map accepts no more changes, and can still be read. A sync is
 //!   not repeated after it failed.
 //!
-//! Byte layouts: `snapshots/mod.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
+//! Byte layouts: `snapshots/mod.rs`, `viewpoint_parts/file.rs`, `journal/segment.rs`, `journal/frame.rs`,
+//! `proto/mrol/store/v1`.
 
 mod checked_files;
 mod codec;
