@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use super::{
     block, check, classify, completions, config, delete, doctor, events, frontiers, grid, health, insert,
@@ -118,7 +118,7 @@ impl Command {
             Self::Restore(restore) => runtime::block_on(restore.run(output)),
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
-            Self::Completions(completions) => completions.run(&output),
+            Self::Completions(completions) => completions.run(CommandLine::command(), &output),
             Self::Lab(lab) => lab.run(),
         }
     }
@@ -127,7 +127,6 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {

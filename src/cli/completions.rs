@@ -2,11 +2,9 @@
 
 use std::fmt;
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 use serde::Serialize;
 
-use super::command_line::CommandLine;
 use crate::console::CliError;
 use crate::console::Output;
 
@@ -26,9 +24,10 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+    /// Prints what completes `command`, the whole command line.
+    pub(super) fn run(&self, mut command: clap::Command, output: &Output) -> Result<(), CliError> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut CommandLine::command(), "mrol", &mut script);
+        clap_complete::generate(self.shell, &mut command, "mrol", &mut script);
         output.print(&Script { script: String::from_utf8_lossy(&script).trim_end() })
     }
 }

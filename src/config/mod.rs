@@ -5,6 +5,7 @@ mod error;
 mod filter;
 mod limits;
 mod listener;
+mod loading;
 mod log;
 mod scans;
 mod settings;

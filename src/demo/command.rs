@@ -26,8 +26,6 @@ use mrol_map::map::{LEVELS_DEFAULT, MapName};
 use mrol_service::MapInfo;
 use mrol_simulate::{Scene, tours};
 
-/// Name of the map that the robots build.
-pub(super) const MAP: &str = "demo";
 /// Answers that are buffered before the printer.
 const NEWS_AHEAD: usize = 16;
 
@@ -107,7 +105,7 @@ impl Demo {
     }
 
     async fn show(&self, serving: Serving, output: &Output) -> Result<Shown, CliError> {
-        let map = MapName::new(MAP).map_err(CliError::failed)?;
+        let map = MapName::new(guide::MAP).map_err(CliError::failed)?;
         let operator = Client::connect(&serving.grpc.to_string()).await?;
         let resolution_m = self.resolution.unwrap_or(if self.explore { 0.05 } else { 0.03 });
         let new_map = NewMap { levels: Some(self.levels), ..NewMap::of(resolution_m) };

@@ -1,7 +1,9 @@
 //! Text on where to look next.
 
-use super::command::MAP;
 use crate::console::Serving;
+
+/// Name of the map that the robots build.
+pub(super) const MAP: &str = "demo";
 
 /// The link to the page that shows the demonstration's map.
 pub(crate) fn page(serving: &Serving) -> String {

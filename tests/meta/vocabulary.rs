@@ -90,8 +90,8 @@ const REPLACED: [(&str, &str); 80] = [
 /// Where an old word is the right one: an error names what a setting was called before, a workload is a room, and over the
 /// wire a pose of a trajectory is just that.
 const ALLOWED: [(&str, &str); 9] = [
-    ("src/config/settings.rs", "disk_free_back_mib"),
-    ("src/config/settings.rs", "memory_back_mib"),
+    ("src/config/loading.rs", "disk_free_back_mib"),
+    ("src/config/loading.rs", "memory_back_mib"),
     ("crates/lab/", "Room"),
     ("crates/simulate/", "Room"),
     ("src/cli/map/", "Room"),

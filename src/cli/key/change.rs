@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 
-use super::command::name;
+use super::name::name;
 use crate::access::{Expiry, KeyName, Secret, revoke_in_file, rotate_in_file};
 use crate::console::CliError;
 use crate::console::Output;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
-use super::{change, list};
+use super::{change, list, name::name};
 use crate::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
 use crate::console::CliError;
 use crate::console::Output;
@@ -177,10 +177,6 @@ impl From<ScopeName> for Scope {
             ScopeName::Admin => Self::Admin,
         }
     }
-}
-
-pub(super) fn name(text: &str) -> Result<KeyName, String> {
-    KeyName::new(text).ok_or_else(|| format!("a name is 1 to 64 of [A-Za-z0-9_.-], got {text:?}"))
 }
 
 fn expiry(text: &str) -> Result<Expiry, String> {

@@ -3,5 +3,6 @@
 mod change;
 mod command;
 mod list;
+mod name;
 
 pub(crate) use command::Keys;

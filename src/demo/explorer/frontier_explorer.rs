@@ -6,11 +6,10 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::goal::Goal;
 use super::standing::{body, own_place, pose_at};
-use super::ways::{Grid, Places, Ways};
+use super::ways::{Grid, Places};
 use mrol_client::{Client, ClientError, new_session};
-use mrol_map::geometry::{Pose, pose_difference};
+use mrol_map::geometry::Pose;
 use mrol_map::map::{MapName, Region, RobotName, SessionName};
 use mrol_map::mapping::Guess;
 use mrol_map::planning::{Body, Frontier, Surroundings, Unknown};
@@ -32,8 +31,6 @@ const SCAN_EVERY_M: f64 = 0.6;
 /// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the robot does.
 const GIVEN_UP_M: f64 = 0.5;
 const VISITS_MAX: usize = 6;
-/// Ways that are tried before it is said that there is none.
-const WAYS_TRIED: usize = 150;
 /// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
 const OWN_PLACE_M: f64 = 0.8;
 /// What a way costs where it cannot keep its room, against others.
@@ -54,38 +51,15 @@ pub(crate) struct Explorer {
     /// The body with the room that it keeps.
     wide_body: Arc<Body>,
     /// Where the sensor is, and where the server found it.
-    truth: Pose,
-    believed: Pose,
+    pub(super) truth: Pose,
+    pub(super) believed: Pose,
     scans: u64,
     /// Where it looked around.
     pub(super) looked: Vec<[f64; 2]>,
     /// The middles of the frontiers that it went to see.
-    visited: Vec<[f64; 3]>,
+    pub(super) visited: Vec<[f64; 3]>,
     /// Places of the sensor as they really were, one after the other.
     path: Vec<[f64; 3]>,
-}
-
-/// What the robot did last.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Step {
-    /// It drove to see a frontier.
-    Visited {
-        /// The frontier.
-        frontier: Box<Frontier>,
-        /// Length of the way, meters.
-        way_m: f64,
-        /// Frontiers that were listed and not given up.
-        listed: usize,
-        /// Answer to its last scan.
-        scan: Box<ScanAnswer>,
-        /// How far the pose that was found is from the true one, meters.
-        error_m: f64,
-    },
-    /// No frontier is left that it can get to.
-    Done {
-        /// Frontiers that are left.
-        left: usize,
-    },
 }
 
 impl Explorer {
@@ -163,41 +137,6 @@ impl Explorer {
         Ok(answer)
     }
 
-    /// Goes to the nearest frontier, with a scan every so often on the way and one at its end.
-    ///
-    /// # Errors
-    /// When the server refuses, or cannot be reached.
-    pub(crate) async fn step(&mut self) -> Result<Step, ClientError> {
-        let listed = self.frontiers().await?;
-        let mut fits = self.places_that_fit().await?;
-        for _ in 0..WAYS_TRIED {
-            let ways = Ways::from(fits.grid, |number, _| fits.costs[number], self.place());
-            let Some(Goal { frontier, cell, .. }) = self.nearest_goal(&listed, &ways).await? else {
-                break;
-            };
-            let way: Vec<[f64; 2]> = ways.way_to(cell);
-            if let Some(share) = self.first_hit(&way).await? {
-                // It fits at both places and not between them: the way leads around the second.
-                let after = (share * (way.len() - 1) as f64).ceil() as usize;
-                fits.take_out(way[after.clamp(1, way.len() - 1)]);
-                continue;
-            }
-            let way_m =
-                way.windows(2).map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1])).sum();
-            let scan = Box::new(self.drive(&way).await?);
-            self.visited.push(frontier.center_m);
-            let error_m = pose_difference(&self.truth, &self.believed).0;
-            return Ok(Step::Visited {
-                frontier: Box::new(frontier),
-                way_m,
-                listed: listed.len(),
-                scan,
-                error_m,
-            });
-        }
-        Ok(Step::Done { left: listed.len() })
-    }
-
     /// The part of the map around the places where the robot was: the smallest and the largest x and y, meters.
     fn around(&self) -> [[f64; 2]; 2] {
         let ends = |axis: usize| {
@@ -209,7 +148,7 @@ impl Explorer {
     }
 
     /// The frontiers that were not given up.
-    async fn frontiers(&self) -> Result<Vec<Frontier>, ClientError> {
+    pub(super) async fn frontiers(&self) -> Result<Vec<Frontier>, ClientError> {
         let [[x_min, y_min], [x_max, y_max]] = self.around();
         let [z_min, z_max] = FRONTIER_HEIGHTS_M;
         let question = FrontierQuestion {
@@ -229,7 +168,7 @@ impl Explorer {
     }
 
     /// The places where the robot's body fits.
-    async fn places_that_fit(&self) -> Result<Places, ClientError> {
+    pub(super) async fn places_that_fit(&self) -> Result<Places, ClientError> {
         let grid = Grid::around(self.around());
         let places: Vec<[f64; 2]> = grid.places().collect();
         let mut costs = vec![1.0; places.len()];
@@ -257,7 +196,7 @@ impl Explorer {
     }
 
     /// Where the body first meets something along a way from where the robot is, as a share of it; none on a free one.
-    async fn first_hit(&self, way: &[[f64; 2]]) -> Result<Option<f64>, ClientError> {
+    pub(super) async fn first_hit(&self, way: &[[f64; 2]]) -> Result<Option<f64>, ClientError> {
         if way.len() < 2 {
             return Ok(None);
         }
@@ -280,7 +219,7 @@ impl Explorer {
     }
 
     /// Drives along a way; the answer to the scan at its end.
-    async fn drive(&mut self, way: &[[f64; 2]]) -> Result<ScanAnswer, ClientError> {
+    pub(super) async fn drive(&mut self, way: &[[f64; 2]]) -> Result<ScanAnswer, ClientError> {
         let mut since_scan_m = 0.0;
         for &place in way.iter().skip(1) {
             // What it believes to have driven it has driven.
@@ -297,7 +236,7 @@ impl Explorer {
         self.look().await
     }
 
-    fn place(&self) -> [f64; 2] {
+    pub(super) fn place(&self) -> [f64; 2] {
         let [x, y, _]: [f64; 3] = self.believed.translation.vector.into();
         [x, y]
     }

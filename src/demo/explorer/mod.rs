@@ -7,8 +7,10 @@
 mod frontier_explorer;
 mod goal;
 mod standing;
+mod step;
 mod visible;
 mod ways;
 
-pub(crate) use frontier_explorer::{Explorer, Step};
+pub(crate) use frontier_explorer::Explorer;
+pub(crate) use step::Step;
 pub(super) use visible::{Visible, never_collided};

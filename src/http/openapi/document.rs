@@ -7,6 +7,7 @@ use axum::response::IntoResponse;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
 
+use super::from_table::KEY;
 use super::{failures, from_table, optional_parts};
 use crate::http::error::{HttpError, Problem};
 use crate::http::forms::NoParams;
@@ -71,9 +72,6 @@ use mrol_service::{Reason, ServiceError};
     components(schemas(Problem))
 )]
 struct OfHandlers;
-
-/// The name of the way in which keys are shown.
-pub(super) const KEY: &str = "key";
 
 /// The description of the HTTP interface, as JSON.
 pub fn openapi_json() -> Result<&'static str, ServiceError> {

@@ -9,13 +9,15 @@ use utoipa::openapi::path::{
 use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{Ref, RefOr, Required};
 
-use super::document::KEY;
 use super::failures;
 use super::request_id::request_id;
 use crate::access::Operation;
 use crate::http::{reader, viewer};
 use crate::json::described;
 use crate::json::schema_of_words;
+
+/// The name of the way in which keys are shown.
+pub(super) const KEY: &str = "key";
 
 /// Fills in what the attributes of handlers do not say.
 pub(super) fn fill_in(paths: &mut Paths) {

@@ -1,0 +1,198 @@
+//! Settings are loaded from defaults, a file, variables and options.
+
+use std::path::Path;
+
+use figment::Figment;
+use figment::providers::{Env, Format, Serialized, Toml};
+use serde::Serialize;
+
+use super::error::ConfigError;
+use super::settings::Config;
+use super::variables;
+
+impl Config {
+    /// Loads the settings: defaults < `file` < `MROL_...` variables < `overrides`, whose nulls (an option that
+    /// was not given) do not count.
+    ///
+    /// A variable counts when it names a setting at the top (`MROL_DATA_DIR`) or holds the `__` between section
+    /// and key (`MROL_HTTP__LISTEN`). One that would be a setting with `__` in place of `_` is refused. Others are left
+    /// alone, since container platforms set names such as `MROL_SERVICE_HOST` for every service called mrol; what
+    /// nobody is known to set, [`unknown_variables`](super::unknown_variables) lists.
+    ///
+    /// # Errors
+    /// For an unknown setting, a value of the wrong type or out of range, a missing file, or a misspelled variable.
+    pub fn load(file: Option<&Path>, overrides: impl Serialize) -> Result<Self, ConfigError> {
+        variables::check(variables::of_environment())?;
+        let mut figment = Figment::from(Serialized::defaults(Self::default()));
+        if let Some(file) = file {
+            if !file.is_file() {
+                return Err(ConfigError::File(file.to_owned()));
+            }
+            figment = figment.merge(Toml::file_exact(file));
+        }
+        let overrides = serde_json::to_value(overrides)
+            .map_err(|error| ConfigError::Value(Box::new(error.to_string().into())))?;
+        let given = Serialized::globals(without_nulls(overrides));
+        let figment = figment.merge(settings_of_environment()).merge(given);
+        if let Some((old, new)) = RENAMED.into_iter().find(|(old, _)| figment.contains(old)) {
+            return Err(ConfigError::Renamed { old, new });
+        }
+        let config: Self = figment.extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
+        config.checked()
+    }
+}
+
+/// Renamed settings: former name, present name.
+const RENAMED: [(&str, &str); 3] = [
+    ("filter.bits_per_voxel", "filter.bits_per_key"),
+    ("limits.disk_free_back_mib", "limits.disk_free_resume_mib"),
+    ("limits.memory_back_mib", "limits.memory_resume_mib"),
+];
+
+/// The provider of the environment variables that are settings; see [`Config::load`].
+fn settings_of_environment() -> Env {
+    Env::prefixed(variables::PREFIX)
+        .filter(|key| key.as_str().contains("__") || variables::TOP.iter().any(|name| key == *name))
+        .split("__")
+}
+
+/// Removes nulls from a JSON value, at any depth.
+fn without_nulls(value: serde_json::Value) -> serde_json::Value {
+    match value {
+        serde_json::Value::Object(fields) => {
+            let given = fields.into_iter().filter(|(_, value)| !value.is_null());
+            given.map(|(key, value)| (key, without_nulls(value))).collect()
+        }
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mrol_service::Limits;
+    use serde_json::json;
+    use std::io::Write;
+    use std::time::Duration;
+
+    fn load(toml: &str, overrides: serde_json::Value) -> Result<Config, ConfigError> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(toml.as_bytes()).unwrap();
+        Config::load(Some(file.path()), overrides)
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_file_and_the_file_over_defaults() {
+        let toml = "drain_seconds = 3\n[http]\nlisten = \"127.0.0.1:1\"\n[limits]\nmaps_max = 2";
+        let given = json!({"drain_seconds": null, "http": {"listen": "0.0.0.0:2"}, "grpc": {"listen": null}});
+        let config = load(toml, given).unwrap();
+        assert_eq!(config.drain_seconds, 3);
+        assert_eq!(config.http.listen.to_string(), "0.0.0.0:2");
+        assert_eq!(config.grpc.listen.to_string(), "127.0.0.1:7334");
+        let limits = config.service_settings().limits;
+        assert_eq!(limits, Limits { maps_max: 2, ..Limits::default() });
+    }
+
+    #[test]
+    fn a_key_that_is_none_is_named() {
+        for (toml, key) in
+            [("color = 1", "color"), ("[http]\nlisen = \"a\"", "lisen"), ("[limits]\nx = 1", "x")]
+        {
+            let error = load(toml, json!({})).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+        }
+        assert!(load("", json!({"http": {"port": 1}})).unwrap_err().to_string().contains("port"));
+    }
+
+    #[test]
+    fn a_setting_of_an_earlier_version_is_refused_with_its_name_of_today() {
+        for (old, new) in RENAMED {
+            let (section, name) = old.split_once('.').unwrap();
+            let error = load(&format!("[{section}]\n{name} = 14"), json!({})).unwrap_err().to_string();
+            assert!(error.contains(old) && error.contains(new), "{error}");
+        }
+    }
+
+    #[test]
+    fn values_that_do_not_fit_are_named() {
+        let error = |toml| load(toml, json!({})).unwrap_err().to_string();
+        let journal = error("[store]\nsnapshot_journal_mib = 0");
+        assert!(journal.contains("store.snapshot_journal_mib must be 1 to 1048576, got 0"), "{journal}");
+        let durability = error("[store]\ndurability = \"often\"");
+        assert!(
+            durability.contains("must be \"always\" or an interval")
+                && durability.contains("store.durability"),
+            "{durability}"
+        );
+        assert!(error("[limits]\nmin_revision_wait_max_s = -1").contains("min_revision_wait_max_s"));
+        assert!(error("[tls]\nkey = \"a\"").contains("tls.certificate is missing"));
+        assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
+        assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
+        let margin = error("[robots.r]\ncarve = true\ncarve_margin_voxels = 9");
+        assert!(margin.contains("robots.r: carve_margin_voxels must be 1 to 8, got 9"), "{margin}");
+        let threads = error("[threads]\nmapping = 1025");
+        assert!(threads.contains("threads.mapping must be 0 to 1024, got 1025"), "{threads}");
+        assert!(
+            error("[limits]\njobs_waiting_max = 1048577").contains("jobs_waiting_max must be 0 to 1048576")
+        );
+        assert!(error("[log]\nformat = \"xml\"").contains("xml"));
+        let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
+        assert!(missing.to_string().contains("no-such-file.toml"));
+    }
+
+    #[test]
+    fn the_delay_before_draining_has_an_end() {
+        let delay = |seconds: u64| load(&format!("drain_delay_s = {seconds}"), json!({}));
+        assert_eq!(delay(3600).unwrap().drain_delay(), Duration::from_secs(3600));
+        let error = delay(3601).unwrap_err().to_string();
+        assert!(error.contains("drain_delay_s must be 0 to 3600, got 3601"), "{error}");
+        assert_eq!(Config::default().drain_delay_s, 0);
+    }
+
+    #[test]
+    fn access_is_open_or_by_keys_and_answers_to_hosts() {
+        let error = |toml| load(toml, json!({})).unwrap_err().to_string();
+        let both = error("[access]\nopen = true\nkeys_file = \"k\"");
+        assert!(both.contains("access.open") && both.contains("access.keys_file"), "{both}");
+        assert!(load("[access]\nopen = false\nkeys_file = \"k\"", json!({})).is_ok());
+        let host = error("[access]\nhosts = [\"mrol\", \"mrol:7333\"]");
+        assert!(
+            host.contains("access.hosts must be names or addresses without ports, got \"mrol:7333\""),
+            "{host}"
+        );
+        assert!(load("[access]\nhosts = [\"mrol\", \"10.0.0.1\"]", json!({})).is_ok());
+        for section in ["access", "tls"] {
+            let days = |days| load(&format!("[{section}]\nexpiry_warning_days = {days}"), json!({}));
+            let refused = days(3651).unwrap_err().to_string();
+            assert!(refused.contains("expiry_warning_days must be 0 to 3650, got 3651"), "{refused}");
+            assert!(days(3650).is_ok() && days(0).is_ok());
+        }
+    }
+
+    #[test]
+    fn marks_need_room_between_them() {
+        let error = |limits| load(&format!("[limits]\n{limits}"), json!({})).unwrap_err().to_string();
+        let disk = error("disk_free_low_mib = 512");
+        assert!(
+            disk.contains("limits.disk_free_resume_mib must be more than limits.disk_free_low_mib, got 512"),
+            "{disk}"
+        );
+        let memory = error("memory_high_mib = 100\nmemory_resume_mib = 100");
+        assert!(memory.contains("memory_resume_mib must be less than limits.memory_high_mib"), "{memory}");
+        assert!(error("memory_resume_mib = 100").contains("limits.memory_high_mib is missing"));
+        let beyond = error("disk_free_resume_mib = 1099511627777");
+        assert!(beyond.contains("disk_free_resume_mib must be 0 to 1099511627776"), "{beyond}");
+
+        let limits = load("[limits]\nmemory_high_mib = 3\ndisk_free_low_mib = 0", json!({})).unwrap();
+        let marks = limits.service_settings().limits.marks();
+        assert_eq!((marks.memory_high_bytes, marks.memory_resume_bytes), (Some(3 << 20), None));
+        assert_eq!((marks.disk_free_low_bytes, marks.disk_free_resume_bytes), (0, 512 << 20));
+    }
+
+    #[test]
+    fn an_empty_data_dir_keeps_maps_in_memory() {
+        let config = load("data_dir = \"\"", json!({})).unwrap();
+        assert_eq!(config.service_settings().data_dir, None);
+        assert!(Config::default().service_settings().data_dir.is_some());
+    }
+}
