@@ -1,7 +1,7 @@
 """Queries of this package against those of the Rust client, over one server: bench/queries.py PROGRAM.
 
-`mrol-lab bench serve` (HTTP and gRPC by the Rust client) and this package ask the same server in turn, so that what else the machine
-does meets all of them. Of each the least median of all rounds counts.
+PROGRAM is `mrol-lab`. Its `bench serve` (HTTP and gRPC by the Rust client) and this package ask the same server in turn, so that
+what else the machine does meets all of them. Of each the least median of all rounds counts.
 """
 
 import argparse
