@@ -39,11 +39,14 @@ fn commit() -> Option<String> {
         return None;
     }
     // The journal of HEAD grows with every commit and checkout; what else is named here makes a clean tree one with changes.
+    // Commands are not: the library would be built anew for a word of their help.
     let journal = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
-    for path in [&journal, "src", "crates", "Cargo.toml", "Cargo.lock", "build.rs"] {
-        if std::path::Path::new(path).exists() {
-            println!("cargo::rerun-if-changed={path}");
-        }
+    let modules = std::fs::read_dir("src").ok()?.flatten().map(|entry| entry.path());
+    let library =
+        modules.filter(|path| !["cli", "demo", "main.rs"].iter().any(|program| path.ends_with(program)));
+    let others = [&journal, "crates", "Cargo.toml", "Cargo.lock", "build.rs"].map(std::path::PathBuf::from);
+    for path in library.chain(others).filter(|path| path.exists()) {
+        println!("cargo::rerun-if-changed={}", path.display());
     }
     git(&["describe", "--always", "--abbrev=12", "--dirty=+changes", "--exclude=*"])
 }

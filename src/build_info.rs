@@ -1,16 +1,16 @@
 //! What was built.
 
 /// Version of the crate.
-pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The commit that was built, `+changes` behind it where files differed from it; "unknown" where nobody said it.
-pub(crate) const COMMIT: &str = env!("BUILT_COMMIT");
+pub const COMMIT: &str = env!("BUILT_COMMIT");
 
 /// The features of the crate that were built, in their order of the alphabet.
-pub(crate) const FEATURES: &str = env!("BUILT_FEATURES");
+pub const FEATURES: &str = env!("BUILT_FEATURES");
 
 /// All three, a line each, as `mrol --version` says them.
-pub(crate) const DESCRIPTION: &str = concat!(
+pub const DESCRIPTION: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\ncommit: ",
     env!("BUILT_COMMIT"),

@@ -12,8 +12,11 @@
 //!   format and a replica of a map.
 //! * [`access`]: the operations by name, and who may ask for each. [`telemetry`]: metrics, audit, log. [`admission`]: what is
 //!   done at once is bounded. [`middleware`], [`config`]: what every request passes; settings. [`json`], [`grpc`], [`http`]:
-//!   adapters. [`server`]: the daemon. [`console`], [`demo`], [`cli`]: the program; the demonstration's robots are simulated by
-//!   the crate `mrol-simulate`.
+//!   adapters. [`server`]: the daemon. [`console`]: what commands read and say, and how the daemon is run. [`offline`]: mapping
+//!   without a server.
+//!
+//! The commands and the demonstration are modules of the program (`src/main.rs`), so that a change of one builds no more than
+//! that.
 //!
 //! What measures and compares is a program of its own, in `crates/lab`.
 //!
@@ -29,15 +32,14 @@
 
 pub mod access;
 pub mod admission;
-mod build_info;
-pub mod cli;
+pub mod build_info;
 pub mod config;
 pub mod console;
-pub mod demo;
 pub mod grpc;
 pub mod http;
 pub mod json;
 pub mod middleware;
+pub mod offline;
 pub mod server;
 pub mod telemetry;
 

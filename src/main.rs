@@ -1,4 +1,7 @@
-//! The `mrol` program; see [`mrol::cli`].
+//! The `mrol` program: its commands, and the demonstration.
+
+mod cli;
+mod demo;
 
 use std::process::ExitCode;
 
@@ -10,5 +13,5 @@ use mimalloc::MiMalloc;
 static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
-    mrol::cli::run()
+    cli::run()
 }

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::console::parse;
+use mrol::console::parse;
 use mrol_map::align::Method;
 use mrol_map::mapping::Guess;
 use mrol_map::scan::{PointFilter, PointFilterError};

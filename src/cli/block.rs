@@ -9,10 +9,10 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::count;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::count;
+use mrol::console::parse;
 use mrol_map::map::{DistanceBlock, Region};
 use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 

@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::points_of;
 use mrol_map::geometry::Point;
 use mrol_map::util::Keyword;
 use mrol_service::ClassifyQuestion;

@@ -6,11 +6,11 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use super::{
     block, check, classify, completions, config, delete, doctor, events, frontiers, grid, health, insert,
-    keepout, key, lab, localize, map, maps, nearest, observers, query, rays, serve, snapshot, undo, watch,
+    keepout, key, lab, localize, map, maps, nearest, observers, query, rays, snapshot, undo, watch,
 };
-use crate::build_info;
-use crate::console::{CliError, Output, runtime};
 use crate::demo::Demo;
+use mrol::build_info;
+use mrol::console::{CliError, Output, Serve, runtime};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -42,7 +42,7 @@ pub(super) struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Serve(serve::Serve),
+    Serve(Serve),
     Demo(Demo),
     Map(map::Map),
     Insert(insert::Insert),
@@ -74,7 +74,7 @@ enum Command {
 }
 
 /// Runs the command line of this process and returns its exit code.
-pub fn run() -> ExitCode {
+pub(crate) fn run() -> ExitCode {
     let CommandLine { json, command } = match CommandLine::try_parse() {
         Ok(parsed) => parsed,
         Err(unparsed) => {
@@ -142,7 +142,7 @@ mod tests {
         }
         let mut found = std::collections::BTreeSet::new();
         variables(&CommandLine::command(), &mut found);
-        let known = crate::config::VARIABLES_OF_COMMANDS.iter().map(|name| format!("MROL_{name}"));
+        let known = mrol::config::VARIABLES_OF_COMMANDS.iter().map(|name| format!("MROL_{name}"));
         assert_eq!(found, known.collect());
     }
 

@@ -5,8 +5,8 @@ use std::fmt;
 use clap_complete::Shell;
 use serde::Serialize;
 
-use crate::console::CliError;
-use crate::console::Output;
+use mrol::console::CliError;
+use mrol::console::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

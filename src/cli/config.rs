@@ -2,9 +2,9 @@
 
 use clap::Subcommand;
 
-use super::serve::ServeOptions;
-use crate::console::CliError;
-use crate::console::Output;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::ServeOptions;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::count;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::count;
+use mrol::console::parse;
+use mrol::console::points_of;
 use mrol_map::geometry::Point;
 use mrol_map::map::{Region, RequestId};
 use mrol_service::{Deletion, DeletionAnswer, DeletionTarget};

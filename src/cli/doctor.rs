@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::console::{bytes, count};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::{bytes, count};
 use mrol_map::map::MapName;
 use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
 use mrol_store::{DataDir, StoreSettings};

@@ -8,10 +8,10 @@ use time::OffsetDateTime;
 use time::format_description;
 
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::count;
-use crate::json::{JsonEvent, JsonScan};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::count;
+use mrol::json::{JsonEvent, JsonScan};
 use mrol_map::align::Verdict;
 use mrol_map::map::RobotName;
 use mrol_service::{EventMessage, EventsQuery, ScanEvent};

@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::count;
-use crate::console::parse;
-use crate::json::JsonPose;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::count;
+use mrol::console::parse;
+use mrol::json::JsonPose;
 use mrol_map::planning::Frontier;
 use mrol_service::FrontierQuestion;
 

@@ -10,8 +10,8 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
 use super::remote::ServerOptions;
-use crate::console::CliError;
-use crate::console::Output;
+use mrol::console::CliError;
+use mrol::console::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

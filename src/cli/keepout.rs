@@ -8,11 +8,11 @@ use clap::Subcommand;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::access::Expiry;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::json::{JsonKeepOut, JsonShape};
+use mrol::access::Expiry;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::json::{JsonKeepOut, JsonShape};
 use mrol_map::map::{KeepOutName, KeepOutShape, Prism, Region, RequestId};
 use mrol_service::{DeleteKeepOut, KeepOutAnswer, PutKeepOut};
 

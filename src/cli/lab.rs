@@ -2,7 +2,7 @@
 
 use clap::Subcommand;
 
-use crate::console::CliError;
+use mrol::console::CliError;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

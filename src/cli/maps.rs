@@ -7,10 +7,10 @@ use clap::Subcommand;
 use serde::Serialize;
 
 use super::remote::ServerOptions;
-use crate::console::CliError;
-use crate::console::MapReport;
-use crate::console::Output;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::MapReport;
+use mrol::console::Output;
+use mrol::console::parse;
 use mrol_client::{NewFilter, NewMap};
 use mrol_map::map::MapName;
 use mrol_service::{MapList, UnavailableMap};

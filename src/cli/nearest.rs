@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::met::met;
-use super::query::points_of;
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::points_of;
 use mrol_map::geometry::Point;
 use mrol_map::planning::MeasuredTo;
 use mrol_service::NearestQuestion;

@@ -6,10 +6,10 @@ use std::fmt::Display;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::json::{JsonObservers, JsonObservingScan};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::json::{JsonObservers, JsonObservingScan};
 use mrol_map::geometry::Point;
 use mrol_service::{ObservedVoxel, ObserversAnswer, ObserversRequest};
 

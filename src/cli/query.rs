@@ -3,19 +3,18 @@
 use std::fmt;
 use std::fmt::Display;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::console::{count, percent};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::{count, percent, points_of};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::Lookup;
-use mrol_map::scan::read_points;
 use mrol_service::{MapVersion, PointAnswer, PointQuery};
 
 /// Number of points of one message: a multiple of 8, so that the bitmaps of messages can be concatenated.
@@ -104,15 +103,6 @@ impl Query {
             keep_out: self.keep_out,
         }
     }
-}
-
-/// Reads the points of a file, which must have at least one.
-pub fn points_of(path: &Path) -> Result<Vec<Point>, CliError> {
-    let points = read_points(path)?;
-    if points.is_empty() {
-        return Err(CliError::failed(format!("{}: no point in this file", path.display())));
-    }
-    Ok(points)
 }
 
 /// The answers to all points.

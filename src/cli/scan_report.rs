@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::json::JsonPose;
+use mrol::json::JsonPose;
 
 /// A scan file's name, for a column.
 pub(super) fn name_of(file: &Path) -> String {

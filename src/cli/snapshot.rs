@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::remote::ServerOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::console::{bytes, count};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::{bytes, count};
 use mrol_client::Client;
 use mrol_map::map::MapName;
 use mrol_service::{MapList, UnavailableMap};

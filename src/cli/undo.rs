@@ -6,10 +6,10 @@ use std::fmt::Display;
 use serde::Serialize;
 
 use super::remote::MapOptions;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::count;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::count;
+use mrol::console::parse;
 use mrol_map::map::{RequestId, RobotName, SessionName};
 use mrol_service::{UndoAnswer, UndoTarget};
 

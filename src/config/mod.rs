@@ -24,6 +24,5 @@ pub use settings::Config;
 pub use store::StoreConfig;
 pub use threads::ThreadsConfig;
 pub use tls::TlsConfig;
-#[cfg(test)]
-pub(crate) use variables::OF_COMMANDS as VARIABLES_OF_COMMANDS;
+pub use variables::OF_COMMANDS as VARIABLES_OF_COMMANDS;
 pub use variables::unknown_variables;

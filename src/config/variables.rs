@@ -12,8 +12,7 @@ pub(super) const PREFIX: &str = "MROL_";
 pub(super) const TOP: [&str; 3] = ["data_dir", "drain_seconds", "drain_delay_s"];
 
 /// Variables that options of commands are read from, without [`PREFIX`]; a test compares them with the command line.
-pub(crate) const OF_COMMANDS: [&str; 7] =
-    ["CONFIG", "SERVER", "KEY", "KEY_FILE", "CA", "CLIENT_CERT", "CLIENT_KEY"];
+pub const OF_COMMANDS: [&str; 7] = ["CONFIG", "SERVER", "KEY", "KEY_FILE", "CA", "CLIENT_CERT", "CLIENT_KEY"];
 
 /// What a variable means to the settings.
 #[derive(Debug, PartialEq, Eq)]

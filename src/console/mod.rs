@@ -1,13 +1,16 @@
 //! What commands say and read: output for people and for programs, errors with their exit codes, values of options.
 //!
-//! The commands of `mrol`, the demonstration and the program of the lab share it.
+//! The commands of `mrol`, the demonstration and the program of the lab share it, and how the daemon is run.
 
+mod credentials;
 pub mod error;
 pub mod map_report;
 pub mod output;
 pub mod parse;
-pub(super) mod plan;
+mod plan;
+mod points;
 pub mod runtime;
+mod serve;
 mod serving;
 pub mod statistics;
 pub mod truth;
@@ -16,7 +19,10 @@ pub use map_report::{MapReport, bytes, count, percent};
 pub use statistics::Statistics;
 pub use truth::true_poses;
 
+pub use self::credentials::CredentialOptions;
 pub use self::error::CliError;
 pub use self::output::Output;
 pub use self::plan::{PlanLayer, plan};
+pub use self::points::points_of;
+pub use self::serve::{Serve, ServeOptions};
 pub use self::serving::Serving;

@@ -5,8 +5,8 @@ use std::fmt::Display;
 
 use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
-use crate::console::CliError;
-use crate::console::count;
+use mrol::console::CliError;
+use mrol::console::count;
 use mrol_service::MapInfo;
 
 /// Largest median error, in voxels, over a tour of 60 scans without odometry, with a margin for the order in which the

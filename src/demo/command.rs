@@ -17,10 +17,10 @@ use super::report::{Beginning, Line};
 use super::robot::Robot;
 use super::summary::Summary;
 use super::{explore, guide, robot};
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::Serving;
-use crate::server::shutdown_signal;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::Serving;
+use mrol::server::shutdown_signal;
 use mrol_client::{Client, NewMap};
 use mrol_map::map::{LEVELS_DEFAULT, MapName};
 use mrol_service::MapInfo;
@@ -40,7 +40,7 @@ EXAMPLES:
 /// See it work: two simulated robots build one map in the real daemon, a planner asks about it
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Demo {
+pub(crate) struct Demo {
     /// End when the robots are done
     #[arg(long)]
     once: bool,

@@ -4,12 +4,12 @@ use std::net::SocketAddr;
 
 use tempfile::TempDir;
 
-use crate::config::Config;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::Serving;
-use crate::server;
-use crate::telemetry::{LogFormat, Logging, start_logging};
+use mrol::config::Config;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::Serving;
+use mrol::server;
+use mrol::telemetry::{LogFormat, Logging, start_logging};
 
 /// Log level: only problems, since the demonstration itself says what happens.
 const LOG_LEVEL: &str = "warn";

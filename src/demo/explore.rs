@@ -10,10 +10,10 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::explorer::{Explorer, Step, Visible, never_collided};
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::{PlanLayer, plan};
-use crate::console::{count, percent};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::{PlanLayer, plan};
+use mrol::console::{count, percent};
 use mrol_client::Client;
 use mrol_map::map::MapName;
 use mrol_map::planning::Frontier;

@@ -1,6 +1,6 @@
 //! Text on where to look next.
 
-use crate::console::Serving;
+use mrol::console::Serving;
 
 /// Name of the map that the robots build.
 pub(super) const MAP: &str = "demo";

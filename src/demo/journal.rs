@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::planner::{Tally, Told};
 use super::report::Line;
 use super::robot::News;
-use crate::console::Statistics;
+use mrol::console::Statistics;
 
 /// Least time over which the planner's rate is computed, since lines may come at once.
 const RATE_WINDOW: Duration = Duration::from_millis(100);

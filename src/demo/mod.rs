@@ -15,4 +15,4 @@ mod report;
 mod robot;
 mod summary;
 
-pub use command::Demo;
+pub(crate) use command::Demo;

@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-use crate::console::CliError;
-use crate::console::Serving;
+use mrol::console::CliError;
+use mrol::console::Serving;
 use mrol_client::Client;
 use mrol_map::geometry::Point;
 use mrol_map::map::{Lookup, MapName};

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::planner::BATCH_POINTS;
 use super::robot::Robot;
-use crate::console::Serving;
-use crate::console::{count, percent};
+use mrol::console::Serving;
+use mrol::console::{count, percent};
 use mrol_map::map::MapSettings;
 use mrol_service::MapInfo;
 

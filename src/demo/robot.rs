@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use crate::console::CliError;
+use mrol::console::CliError;
 use mrol_client::{Client, new_session};
 use mrol_map::geometry::{Pose, pose_difference};
 use mrol_map::map::{MapName, RobotName};

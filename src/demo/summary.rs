@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::checks::Checks;
 use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
-use crate::console::{bytes, count, percent};
+use mrol::console::{bytes, count, percent};
 use mrol_service::MapInfo;
 
 /// The summary.

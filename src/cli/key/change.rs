@@ -8,9 +8,9 @@ use std::time::{Duration, SystemTime};
 use serde::Serialize;
 
 use super::name::name;
-use crate::access::{Expiry, KeyName, Secret, revoke_in_file, rotate_in_file};
-use crate::console::CliError;
-use crate::console::Output;
+use mrol::access::{Expiry, KeyName, Secret, revoke_in_file, rotate_in_file};
+use mrol::console::CliError;
+use mrol::console::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct RevokeKey {

@@ -9,10 +9,10 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::{change, list, name::name};
-use crate::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
+use mrol::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
 use mrol_map::map::{MapName, RobotName};
 use mrol_service::AllowedMaps;
 

@@ -7,9 +7,9 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use crate::access::{Expiry, KeyEntry, list_file};
-use crate::console::CliError;
-use crate::console::Output;
+use mrol::access::{Expiry, KeyEntry, list_file};
+use mrol::console::CliError;
+use mrol::console::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ListKeys {

@@ -1,6 +1,6 @@
 //! The name of a key, as options take it.
 
-use crate::access::KeyName;
+use mrol::access::KeyName;
 
 /// Parses the name of a key.
 pub(super) fn name(text: &str) -> Result<KeyName, String> {

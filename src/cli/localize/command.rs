@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use super::report::Localized;
 use crate::cli::remote::ServerOptions;
 use crate::cli::scan_report::name_of;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
 use mrol_client::Client;
 use mrol_map::align::AlignmentSettings;
 use mrol_map::align::localize::{

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use serde::Serialize;
 
 use crate::cli::scan_report::{PLACE_HEAD, place};
-use crate::json::JsonLocalization;
+use mrol::json::JsonLocalization;
 use mrol_service::LocalizationAnswer;
 
 #[derive(Serialize)]

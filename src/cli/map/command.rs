@@ -5,16 +5,16 @@ use std::time::Instant;
 
 use uuid::Uuid;
 
-use super::ample::FalsePositives;
-use super::mapper::{Mapped, Mapper};
 use super::report::{ScanLine, Summary};
-use super::truth_errors::TruthErrors;
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use crate::cli::scan_report::name_of;
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::parse;
-use crate::console::true_poses;
+use mrol::console::CliError;
+use mrol::console::Output;
+use mrol::console::parse;
+use mrol::console::true_poses;
+use mrol::offline::FalsePositives;
+use mrol::offline::TruthErrors;
+use mrol::offline::{Mapped, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};

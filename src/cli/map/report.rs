@@ -5,12 +5,12 @@ use std::fmt::Display;
 
 use serde::{Serialize, Serializer};
 
-use super::ample::FilterSummary;
-use super::mapper::Mapped;
-use super::truth_errors::ErrorSummary;
 use crate::cli::scan_report::{PLACE_HEAD, place};
-use crate::console::count;
-use crate::json::JsonPose;
+use mrol::console::count;
+use mrol::json::JsonPose;
+use mrol::offline::ErrorSummary;
+use mrol::offline::FilterSummary;
+use mrol::offline::Mapped;
 use mrol_map::util::Keyword;
 
 /// The line of a scan.
@@ -151,29 +151,5 @@ impl Display for Summary {
             write!(f, "\n{error}")?;
         }
         self.filter.iter().try_for_each(|filter| write!(f, "\n{filter}"))
-    }
-}
-
-impl Display for ErrorSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { meters: m, degrees: d } = self;
-        write!(f, "error: max {:.4} m {:.3} deg, ", m.max, d.max)?;
-        write!(f, "median {:.4} m {:.3} deg, rms {:.4} m {:.3} deg", m.median, d.median, m.rms, d.rms)
-    }
-}
-
-impl Display for FilterSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "filters: {} look-ups, expected false positive rate {:.3e}, at most {:.3e} false positives expected: ",
-            count(self.lookups as usize),
-            self.expected_false_positive_rate,
-            self.expected_false_positives
-        )?;
-        match self.ample {
-            true => write!(f, "ample (below 1), the poses are those of the exact sets"),
-            false => write!(f, "not ample (below 1); more --filter-hashes and --filter-bits-per-key are"),
-        }
     }
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use super::{bench, experiment};
-use mrol::cli::serve::Serve;
+use mrol::console::Serve;
 use mrol::console::{CliError, Output, runtime};
 
 const EXAMPLES: &str = "\

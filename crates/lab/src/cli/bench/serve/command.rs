@@ -6,7 +6,7 @@ use super::protocol::Protocol;
 use super::report::Line;
 use crate::cli::bench::workload::{MapOptions, WorkloadOptions};
 use crate::fleet::{GrpcAddress, HttpAddress, Load, Question, Target};
-use mrol::cli::remote::CredentialOptions;
+use mrol::console::CredentialOptions;
 use mrol::console::error::CliError;
 use mrol::console::map_report::count;
 use mrol::console::output::Output;

@@ -1,6 +1,10 @@
 //! Check whether the filters are ample: the expected number of wrong answers in a run.
 
+use std::fmt::{self, Display};
+
 use serde::Serialize;
+
+use crate::console::count;
 
 /// Expected false positives, summed over scans.
 ///
@@ -41,6 +45,22 @@ pub struct FilterSummary {
     pub expected_false_positives: f64,
     /// Fewer than one wrong answer is expected.
     pub ample: bool,
+}
+
+impl Display for FilterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "filters: {} look-ups, expected false positive rate {:.3e}, at most {:.3e} false positives expected: ",
+            count(self.lookups as usize),
+            self.expected_false_positive_rate,
+            self.expected_false_positives
+        )?;
+        match self.ample {
+            true => write!(f, "ample (below 1), the poses are those of the exact sets"),
+            false => write!(f, "not ample (below 1); more --filter-hashes and --filter-bits-per-key are"),
+        }
+    }
 }
 
 #[cfg(test)]

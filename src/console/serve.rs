@@ -7,11 +7,12 @@ use std::pin::pin;
 use serde_json::json;
 
 use crate::config::{Config, ConfigError, unknown_variables};
-use crate::console::CliError;
-use crate::console::Output;
-use crate::console::Serving;
 use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
 use crate::telemetry::start_logging;
+
+use super::error::CliError;
+use super::output::Output;
+use super::serving::Serving;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -45,7 +46,7 @@ pub struct Serve {
 
 /// Options that override settings of the daemon.
 #[derive(Debug, clap::Args)]
-pub(super) struct ServeOptions {
+pub struct ServeOptions {
     /// Settings to start from, TOML; variables and options override them
     #[arg(long, env = "MROL_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
@@ -145,7 +146,7 @@ impl Serve {
 
 impl ServeOptions {
     /// The effective settings.
-    pub(super) fn config(&self) -> Result<Config, ConfigError> {
+    pub fn config(&self) -> Result<Config, ConfigError> {
         let options = json!({
             "data_dir": self.data_dir,
             "http": {"listen": self.http_listen, "socket": self.http_socket},

@@ -1,5 +1,7 @@
 //! Errors of estimated poses against true ones.
 
+use std::fmt::{self, Display};
+
 use serde::Serialize;
 
 use crate::console::Statistics;
@@ -51,6 +53,14 @@ impl TruthErrors {
     pub fn summary(&self) -> Option<ErrorSummary> {
         let meters = Statistics::of(self.meters.clone())?;
         Some(ErrorSummary { meters, degrees: Statistics::of(self.degrees.clone())? })
+    }
+}
+
+impl Display for ErrorSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { meters: m, degrees: d } = self;
+        write!(f, "error: max {:.4} m {:.3} deg, ", m.max, d.max)?;
+        write!(f, "median {:.4} m {:.3} deg, rms {:.4} m {:.3} deg", m.median, d.median, m.rms, d.rms)
     }
 }
 

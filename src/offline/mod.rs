@@ -1,0 +1,9 @@
+//! Mapping in this process, without a server, and what is said about the result.
+
+mod ample;
+mod mapper;
+mod truth_errors;
+
+pub use ample::{FalsePositives, FilterSummary};
+pub use mapper::{Mapped, Mapper};
+pub use truth_errors::{ErrorSummary, TruthErrors};
