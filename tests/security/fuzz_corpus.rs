@@ -8,7 +8,10 @@
     unreachable_pub,
     reason = "the fuzzers use it from outside"
 )]
-mod targets;
+mod files;
+#[path = "../fuzz/server/src/lib.rs"]
+#[allow(clippy::allow_attributes, unreachable_pub, reason = "the fuzzers use it from outside")]
+mod server;
 
 use std::path::{Path, PathBuf};
 
@@ -22,11 +25,19 @@ fn kept(target: &str) -> Vec<PathBuf> {
     inputs
 }
 
+/// Calls the target of that name.
+fn run(name: &str, input: &[u8]) {
+    match files::TARGETS.iter().any(|(target, _)| *target == name) {
+        true => files::run(name, input),
+        false => server::run(name, input),
+    }
+}
+
 /// Runs what is kept for a target; the name of the input at hand is in the output of a test that fails.
 fn replay(target: &str) {
     for input in kept(target) {
         println!("{}", input.display());
-        targets::run(target, &std::fs::read(&input).expect("an input"));
+        run(target, &std::fs::read(&input).expect("an input"));
     }
 }
 
@@ -41,7 +52,8 @@ macro_rules! replayed {
 
         #[test]
         fn no_target_is_left_out() {
-            assert_eq!(targets::TARGETS.map(|(name, _)| name), [$(stringify!($target)),*]);
+            let all: Vec<&str> = files::TARGETS.iter().chain(&server::TARGETS).map(|(name, _)| *name).collect();
+            assert_eq!(all, [$(stringify!($target)),*]);
         }
     };
 }

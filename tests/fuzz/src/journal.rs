@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mrol::geometry::Pose;
-use mrol::map::{
+use mrol_map::geometry::Pose;
+use mrol_map::map::{
     CallerName, Change, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
     MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Prism, Request, RequestId, RobotName,
     ScanRecord, UndoRecord,
 };
-use mrol::store::{
+use mrol_map::voxel::VoxelKey;
+use mrol_store::{
     DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
 };
-use mrol::voxel::VoxelKey;
 use uuid::Uuid;
 
 use super::frames;
@@ -159,9 +159,9 @@ fn change(revision: u64) -> Change {
             let robot = RobotName::new("r1").expect("a name");
             let pose = MappedScan { scan_id: Some(revision), ..MappedScan::new(robot, Pose::identity()) };
             let first = revision as i32 * 20;
-            let lattice = mrol::voxel::Lattice::new(0.1, 4).expect("settings");
+            let lattice = mrol_map::voxel::Lattice::new(0.1, 4).expect("settings");
             let points = (first..first + 100).map(|i| {
-                mrol::geometry::Point::new(
+                mrol_map::geometry::Point::new(
                     (i % 9) as f32 / 10.0,
                     (i / 9 % 9) as f32 / 10.0,
                     -((i / 81) as f32) / 10.0,

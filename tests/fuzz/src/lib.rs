@@ -1,16 +1,12 @@
-//! What is fuzzed: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
+//! What is fuzzed of files: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
 //! up, `tests/security/fuzz_corpus.rs` with the inputs that are kept.
 
 mod frames;
-mod grpc;
-mod hosted;
-mod http;
 mod journal;
 mod map_file;
 mod map_state;
 mod record;
 mod scan_files;
-mod settings_files;
 #[path = "../../support/simulated_disk.rs"]
 #[allow(dead_code, unreachable_pub, reason = "it is used in part")]
 mod simulated;
@@ -19,17 +15,13 @@ mod simulated;
 pub type Target = fn(&[u8]);
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 6] = [
     ("journal", journal::journal),
     ("record", record::record),
     ("map_file", map_file::map_file),
     ("ply", scan_files::ply),
     ("pcd", scan_files::pcd),
     ("text", scan_files::text),
-    ("config", settings_files::config),
-    ("keys", settings_files::keys),
-    ("grpc", grpc::grpc),
-    ("http", http::http),
 ];
 
 /// Calls the target of that name.

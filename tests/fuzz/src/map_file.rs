@@ -1,6 +1,6 @@
 //! Map files, as `mrol restore` takes them from anybody.
 
-use mrol::store::{MapFileLimits, Snapshot};
+use mrol_store::{MapFileLimits, Snapshot};
 
 use super::{frames, map_state};
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use mrol::align::{AlignmentSettings, align};
-use mrol::geometry::{Point, Pose};
-use mrol::map::{Lookup, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord};
-use mrol::store::Snapshot;
+use mrol_map::align::{AlignmentSettings, align};
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::{Lookup, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord};
+use mrol_store::Snapshot;
 use uuid::Uuid;
 
 /// An alignment takes as long as a hundred inputs without: so many share one.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use mrol::geometry::Point;
-use mrol::scan::{ReadError, parse_points, parse_trajectory};
+use mrol_map::geometry::Point;
+use mrol_map::scan::{ReadError, parse_points, parse_trajectory};
 
 /// The shortest points: three single digits of text, or twelve bytes that LZF may have shrunk to an eighty-eighth.
 const POINTS_A_BYTE_MAX: usize = 8;
