@@ -11,7 +11,7 @@ pub(super) const PREFIX: &str = "MROL_";
 /// Settings outside of any section, which need no `__`.
 pub(super) const TOP: [&str; 3] = ["data_dir", "drain_seconds", "drain_delay_s"];
 
-/// Variables that options of commands are read from, without [`PREFIX`]; a test compares them with the command line.
+/// Variables that options of commands are read from, without `MROL_`; a test compares them with the command line.
 pub const OF_COMMANDS: [&str; 7] = ["CONFIG", "SERVER", "KEY", "KEY_FILE", "CA", "CLIENT_CERT", "CLIENT_KEY"];
 
 /// What a variable means to the settings.
