@@ -193,7 +193,8 @@ proptest! {
     ) {
         let sheet = Region::cuboid([-100.0, -100.0, 0.0], [100.0, 100.0, thickness]).unwrap();
         let map = map_of(Vec::new(), vec![KeepOutShape::of_region(sheet).unwrap()]);
-        (numbers[2], numbers[9]) = (2.0 + numbers[2], -2.0 - numbers[9].abs());
+        // All of the body is above the sheet at first, and below it at last.
+        (numbers[2], numbers[9]) = (3.0 + numbers[2], -2.0 - numbers[9].abs());
         let asked = Asked { map: &map, body: &body, numbers: &numbers, step_m, level };
         let told = asked.answer(true);
         prop_assert!(!told.is_free() && told.clearance_m == Some(0.0));
