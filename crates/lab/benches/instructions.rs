@@ -106,8 +106,7 @@ fn encoded() -> Bytes {
 }
 
 #[library_benchmark(setup = encoded)]
-// 2,756 when all was one crate: what checks a name and makes a pose is called across crates now.
-#[bench::question(config = limited(2_870))]
+#[bench::question(config = limited(2_756))]
 fn decoded(message: Bytes) -> usize {
     let request = pb::QueryPointsRequest::decode(message).expect("a message");
     let (_, query) = <(MapName, PointQuery)>::try_from(request).expect("a question");
