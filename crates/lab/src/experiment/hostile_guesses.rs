@@ -124,7 +124,7 @@ impl Place {
 }
 
 /// A pose so many meters and degrees off `truth`, in a uniform direction and about a uniform axis.
-fn off_by(truth: &Pose, (meters, degrees): (f64, f64), random: &mut ChaCha8Rng) -> Pose {
+pub(super) fn off_by(truth: &Pose, (meters, degrees): (f64, f64), random: &mut ChaCha8Rng) -> Pose {
     let shift = Translation3::from(direction(random) * meters);
     let turn = UnitQuaternion::from_scaled_axis(direction(random) * degrees.to_radians());
     Pose::from_parts(shift * truth.translation, turn * truth.rotation)

@@ -9,3 +9,4 @@ pub mod hostile_guesses;
 pub mod mapping;
 pub mod rounds;
 pub mod stages;
+pub mod verdicts;

@@ -9,6 +9,7 @@
 //! sampled_scan    step 1                a volumetric sample (III-A)
 //! stages          steps 2 to 5          an ascent at each level (ascent, overlap), and the sub-voxel stage (refine)
 //! verdict                               whether to believe the pose (information, slide, free_space, prior)
+//! agreement       ray_agreement         whether rays of scan and map agree, which no verdict asks yet
 //! multi_start                           further guesses, where the first ends badly
 //! localize                              no guess at all
 //! ```
@@ -18,6 +19,7 @@
 //! scan would fit as well at poses nearby: what it sees of the map, such as one blank wall, leaves a direction of the
 //! pose open ([`PoseInformation`]).
 
+mod agreement;
 mod ascent;
 mod extent;
 mod free_space;
@@ -37,6 +39,7 @@ mod stages;
 mod tests;
 mod verdict;
 
+pub use agreement::{RayAgreement, RayCounts, ray_agreement};
 pub use free_space::{Contradiction, FreeSpaceSettings};
 pub use information::{Direction, PoseInformation};
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};

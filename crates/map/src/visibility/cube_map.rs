@@ -70,6 +70,13 @@ impl CubeMap {
         Some(Projection { face, pixel, depth_m })
     }
 
+    /// How deep the point at `offset` lies on a face, along its axis: less than 0 of what lies behind.
+    #[inline(always)]
+    pub(super) fn depth_on(self, face: usize, offset: [f32; 3]) -> f32 {
+        let along = offset[face / 2];
+        if face.is_multiple_of(2) { along } else { -along }
+    }
+
     /// The number of the tile that holds a pixel, and of the pixel in it.
     #[inline(always)]
     pub(super) fn place(self, face: usize, [column, row]: [usize; 2]) -> (usize, usize) {

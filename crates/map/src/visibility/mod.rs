@@ -11,15 +11,19 @@ mod range_image;
 mod ray_gaps;
 mod ray_index;
 mod reach;
+mod scan_image;
 mod scan_surface;
 mod set;
+mod sight;
 #[cfg(test)]
 mod tests;
 mod tile;
 mod vectors;
 mod viewpoint;
 
-pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, Sweep, WellBeyond};
+pub use range_image::{IMAGE_BYTES_MAX, Met, RangeImage, RangeImageError, Sweep, WellBeyond};
+pub use scan_image::ScanImage;
 pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
+pub use sight::Sight;
 pub use viewpoint::{VIEWPOINT_MEMORY_MAX, Viewpoint};

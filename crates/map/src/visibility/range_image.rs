@@ -4,6 +4,7 @@ use super::cube_map::{CubeMap, Pixel, Projection};
 use super::density::PointDensity;
 use super::nearest_depths::{NearestDepths, SPACING_MAX};
 use super::ray_gaps::RayGaps;
+use super::sight::{Sight, sight};
 use super::tile::{TILE_BYTES, Tile};
 use super::vectors::norm;
 use crate::geometry::Point;
@@ -48,6 +49,15 @@ pub struct RangeImage {
 
 /// The place of a tile that is not kept.
 const NOT_SEEN: u16 = u16::MAX;
+
+/// A place that a scan met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// From the sensor, in its frame, meters.
+    pub offset: [f32; 3],
+    /// How far off it may be along the axis of its face, meters: pixels are wide, and depths are rounded.
+    pub error_m: f32,
+}
 
 /// How a scan looked around.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -221,6 +231,35 @@ impl RangeImage {
         let (tile, pixel) = self.map.place(face, pixel);
         let tile = self.tiles.get(usize::from(self.places[tile]))?;
         tile.depth(pixel).map(|depth| depth as f32 * self.unit_m)
+    }
+
+    /// What the scan tells of the point at `offset` from the sensor, in its frame, meters.
+    pub fn sight(&self, offset: [f32; 3], tolerance_m: f32) -> Sight {
+        sight(self.map, |(face, pixel)| self.depth_m(face, pixel), offset, tolerance_m + self.rays.moved_m)
+    }
+
+    /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw.
+    pub fn met(&self, wish: usize) -> Vec<Met> {
+        let kept = self.tiles.iter().map(Tile::seen_pixels).sum::<usize>();
+        let stride = kept.div_ceil(wish.max(1)).max(1);
+        let seen = self.map.all_pixels().filter(|&(face, pixel)| self.depth_m(face, pixel).is_some());
+        seen.step_by(stride).filter_map(|pixel| self.met_at(pixel)).collect()
+    }
+
+    /// What was met in a pixel. Its depth is that of the nearest point in it: how far off that is from the middle of the pixel is told
+    /// by the pixels around it.
+    fn met_at(&self, (face, pixel): Pixel) -> Option<Met> {
+        let depth_m = self.depth_m(face, pixel)?;
+        let beside = [[-1, 0], [1, 0], [0, -1], [0, 1]].into_iter();
+        let on_face =
+            beside.filter_map(|steps| self.map.beside((face, pixel), steps)).filter(|at| at.0 == face);
+        let changes =
+            on_face.filter_map(|(face, pixel)| self.depth_m(face, pixel)).map(|m| (m - depth_m).abs());
+        let tile = self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))?;
+        Some(Met {
+            offset: self.map.direction(face, pixel).map(|c| c * depth_m),
+            error_m: changes.fold(f32::from(tile.step()) * self.unit_m, f32::max) + self.rays.moved_m,
+        })
     }
 
     /// The directions that were seen, each as the point up to which: offsets from the sensor in its frame, meters.

@@ -62,6 +62,11 @@ impl Tile {
         f32::from(self.gap) * GAP_UNIT
     }
 
+    /// By how much depths may have been rounded down, in the image's unit.
+    pub(super) fn step(&self) -> u16 {
+        self.step
+    }
+
     /// How many pixels were seen.
     pub(super) fn seen_pixels(&self) -> usize {
         self.seen.iter().filter(|seen| **seen > 0).count()

@@ -7,6 +7,7 @@ mod furniture;
 mod hall;
 mod mover;
 mod object;
+mod places;
 mod ray;
 mod shape;
 mod simulated_scene;

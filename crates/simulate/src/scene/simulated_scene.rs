@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::object::Object;
 use super::ray::Ray;
-use super::{building, equal_rooms, furnish, hall};
+use super::{building, equal_rooms, furnish, hall, places};
 
 /// A simulated scene: four rooms and a corridor of 14 x 9 x 2.7 m, with furniture. The map frame's origin is a corner
 /// of the floor; z points up.
@@ -31,6 +31,24 @@ impl Scene {
     /// x, with the same cupboards drawn from `seed`: a scan of one is a scan of the other.
     pub fn equal_rooms(seed: u64, apart_m: f64) -> Self {
         Self { objects: equal_rooms::equal_rooms(seed, apart_m) }
+    }
+
+    /// A room of `length_m` x `width_m` x 2.7 m about the origin, with as many pieces of furniture drawn from `seed`: turned around, its
+    /// walls look the same.
+    pub fn rectangular_room(seed: u64, [length_m, width_m]: [f64; 2], pieces: usize) -> Self {
+        Self { objects: places::rectangular_room(seed, length_m, width_m, pieces) }
+    }
+
+    /// An aisle along x between shelves, 3 m wide and `length_m` long from x = 0, with an upright every `period_m`.
+    pub fn aisle(period_m: f64, length_m: f64) -> Self {
+        Self { objects: places::aisle(period_m, length_m) }
+    }
+
+    /// This scene, with people drawn from `seed` about a place.
+    pub fn with_people(&self, seed: u64, people: usize, about: [f64; 2]) -> Self {
+        let mut objects = self.objects.clone();
+        objects.extend(places::crowd(seed, people, about));
+        Self { objects }
     }
 
     /// Distance from `origin` (map frame, meters) to the first surface along `direction`, none beyond

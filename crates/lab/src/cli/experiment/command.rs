@@ -4,7 +4,7 @@ use clap::Subcommand;
 
 use super::{
     carving, convergence, deskewing, free_space, hostile_guesses, lookup, mapping, rounds, scaling,
-    simulation,
+    simulation, verdicts,
 };
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
@@ -25,6 +25,8 @@ EXAMPLES:
   mrol-lab experiment carving                      what a map loses of what is taken away, and keeps of what stands
   mrol-lab experiment hostile-guesses hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
+  mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
+                                               wrong poses accepted and right ones refused; simulated places too
 
 Everything is measured when it is asked for, on one core; give the machine nothing else to do meanwhile.";
 
@@ -48,6 +50,7 @@ enum Which {
     Rounds(rounds::Rounds),
     Scaling(scaling::Scaling),
     Simulation(simulation::Simulation),
+    Verdicts(verdicts::Verdicts),
 }
 
 impl Experiment {
@@ -63,6 +66,7 @@ impl Experiment {
             Which::Rounds(rounds) => rounds.run(&output),
             Which::Scaling(scaling) => scaling.run(&output),
             Which::Simulation(simulation) => simulation.run(&output),
+            Which::Verdicts(verdicts) => verdicts.run(&output),
         }
     }
 }

@@ -49,10 +49,10 @@ pub(super) struct HostileGuesses {
 
 /// A set of scans: its folder, the side of a voxel, and the place it shows.
 #[derive(Debug, Clone)]
-struct SetOption {
-    folder: PathBuf,
-    resolution_m: f64,
-    place: String,
+pub(super) struct SetOption {
+    pub(super) folder: PathBuf,
+    pub(super) resolution_m: f64,
+    pub(super) place: String,
 }
 
 impl FromStr for SetOption {
@@ -72,11 +72,16 @@ impl FromStr for SetOption {
 }
 
 impl SetOption {
-    fn read(&self, output: &Output) -> Result<Place, CliError> {
+    /// The scans, with their true poses.
+    pub(super) fn scans(&self, output: &Output) -> Result<Vec<Scan>, CliError> {
         let files = scan_files(std::slice::from_ref(&self.folder))?;
         let poses = true_poses(&self.folder.join("poses.txt"), files.len(), output)?;
         let scan = |(file, pose): (&PathBuf, Pose)| Ok(Scan::of_finite(read_points(file)?, Some(pose)));
-        let scans = files.iter().zip(poses).map(scan).collect::<Result<Vec<_>, CliError>>()?;
+        files.iter().zip(poses).map(scan).collect()
+    }
+
+    fn read(&self, output: &Output) -> Result<Place, CliError> {
+        let scans = self.scans(output)?;
         let settings = MapSettings::new(self.resolution_m, LEVELS_DEFAULT);
         let place = Place::of(&self.place, scans, settings).map_err(CliError::usage)?;
         match place.is_empty() {
@@ -87,7 +92,7 @@ impl SetOption {
         }
     }
 
-    fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
     }
 }

@@ -11,5 +11,6 @@ mod mapping;
 mod rounds;
 mod scaling;
 mod simulation;
+mod verdicts;
 
 pub(in crate::cli) use command::Experiment;

@@ -1,0 +1,282 @@
+//! Agreement of rays: whether a scan at a pose and the scans before it saw the same surfaces.
+//!
+//! A point of the scan is looked for in the images of earlier viewpoints, and what these met in the image of the scan. It *agrees*
+//! where something was met there, it is *contradicted* where all that was met lies behind it, and what nobody saw says nothing.
+//! So neither the density of a map nor the spacing of rays against its voxels plays a part, and new ground is no argument.
+
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use super::sampled_scan::SampledScan;
+use crate::geometry::{Point, Pose};
+use crate::map::{Lookup, MultiResolutionMap};
+use crate::util::StopSignal;
+use crate::visibility::{Met, ScanImage, Sight, Viewpoint, ViewpointSet};
+
+/// Points of the scan that are looked for in the images of viewpoints.
+const POINTS: usize = 800;
+/// Places that a viewpoint met, which are looked for in the image of the scan.
+const POINTS_OF_VIEWPOINT: usize = 500;
+/// Viewpoints that are asked.
+const VIEWPOINTS: usize = 8;
+/// Viewpoints near a pose among which those are chosen that saw most of what the scan shows.
+const NEAR: usize = 32;
+/// Points that tell how much of it a viewpoint saw.
+const POINTS_TO_CHOOSE: usize = 64;
+/// Depths that differ by so many r_0 are the same.
+const TOLERANCE: f64 = 2.0;
+/// The level whose voxels tell whether the map still holds what a viewpoint met.
+const STILL_THERE_LEVEL: u32 = 2;
+
+/// What rays of one side say of a pose: a number of points that were asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RayCounts {
+    /// Points that were looked for.
+    pub asked: usize,
+    /// Those where the other side met something, too.
+    pub agree: usize,
+    /// Those through which the other side saw.
+    pub contradicted: usize,
+}
+
+/// How the rays of a scan at a pose and those of earlier viewpoints agree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RayAgreement {
+    /// The scan's points, in the images of the viewpoints.
+    pub of_scan: RayCounts,
+    /// What the viewpoints met, in the image of the scan.
+    pub of_map: RayCounts,
+}
+
+/// What is asked of the rays of a scan, made once for all poses.
+#[derive(Debug)]
+struct Rays {
+    image: ScanImage,
+    points: Vec<Point>,
+    viewpoints: Arc<ViewpointSet>,
+    tolerance_m: f32,
+}
+
+/// A place that a viewpoint met, and the map still holds.
+struct MetInMap {
+    place_m: [f64; 3],
+    /// As [`Met::error_m`].
+    error_m: f32,
+}
+
+impl RayCounts {
+    fn of(sights: impl Iterator<Item = Sight>) -> Self {
+        sights.fold(Self::default(), |counts, sight| Self {
+            asked: counts.asked + 1,
+            agree: counts.agree + usize::from(sight == Sight::Agrees),
+            contradicted: counts.contradicted + usize::from(sight == Sight::Contradicts),
+        })
+    }
+
+    /// The share of points that agree, of those of which anything is known; 0 where nothing is.
+    pub fn share(&self) -> f64 {
+        self.agree as f64 / (self.agree + self.contradicted).max(1) as f64
+    }
+
+    /// The share of all points that agree.
+    pub fn evidence(&self) -> f64 {
+        self.agree as f64 / self.asked.max(1) as f64
+    }
+}
+
+impl RayAgreement {
+    /// The smaller share of both sides.
+    pub fn worse(&self) -> f64 {
+        self.of_scan.share().min(self.of_map.share())
+    }
+
+    /// The larger share of both sides: people and what was moved contradict one side only.
+    pub fn better(&self) -> f64 {
+        self.of_scan.share().max(self.of_map.share())
+    }
+
+    /// The smaller evidence of both sides.
+    pub fn evidence(&self) -> f64 {
+        self.of_scan.evidence().min(self.of_map.evidence())
+    }
+}
+
+impl Rays {
+    /// The rays of a scan; none in a map without viewpoints.
+    fn of(map: &MultiResolutionMap, scan: &SampledScan<'_>) -> Option<Self> {
+        let viewpoints = map.viewpoints();
+        if viewpoints.is_empty() {
+            return None;
+        }
+        let points = spread(&scan.surface_sample, POINTS);
+        let tolerance_m = (TOLERANCE * map.lattice().resolution_m(0)) as f32;
+        Some(Self { image: ScanImage::of(scan.points), points, viewpoints, tolerance_m })
+    }
+
+    /// The viewpoints to ask about a scan at a pose: of those near to it, those that saw most of what it shows there.
+    fn viewpoints_for(&self, pose: &Pose) -> Vec<Arc<Viewpoint>> {
+        let distance_m = |viewpoint: &Viewpoint| {
+            (viewpoint.map_from_sensor().translation.vector - pose.translation.vector).norm()
+        };
+        let mut near: Vec<_> = self.viewpoints.iter().map(|(_, it)| (distance_m(it), it)).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near.truncate(NEAR);
+        let few = spread(&self.points, POINTS_TO_CHOOSE);
+        let tells = |viewpoint: &Viewpoint| {
+            let sights = few.iter().map(|point| self.sight_of(viewpoint, pose, *point));
+            sights.filter(|sight| *sight != Sight::Silent).count()
+        };
+        let mut ranked: Vec<_> = near.into_iter().map(|(_, it)| (tells(it), it)).collect();
+        ranked.sort_by_key(|(tells, _)| Reverse(*tells));
+        ranked.into_iter().take(VIEWPOINTS).map(|(_, viewpoint)| Arc::clone(viewpoint)).collect()
+    }
+
+    /// What the viewpoints met, and the map still holds.
+    fn met(map: &MultiResolutionMap, viewpoints: &[Arc<Viewpoint>]) -> Vec<MetInMap> {
+        let of_viewpoint = |viewpoint: &Arc<Viewpoint>| {
+            let map_from_sensor = *viewpoint.map_from_sensor();
+            let met = viewpoint.image().met(POINTS_OF_VIEWPOINT).into_iter();
+            met.map(move |Met { offset, error_m }| MetInMap {
+                place_m: (map_from_sensor * Point3::from(offset.map(f64::from))).into(),
+                error_m,
+            })
+        };
+        let met: Vec<MetInMap> = viewpoints.iter().flat_map(of_viewpoint).collect();
+        let points: Vec<Point> = met.iter().map(|met| Point::from(Point3::from(met.place_m))).collect();
+        let mut occupied = vec![0u64; points.len().div_ceil(64)];
+        let level = STILL_THERE_LEVEL.min(map.lattice().levels() - 1);
+        map.view().query(&points, &map.lattice().from_map(), level, Lookup::Exact, &mut occupied);
+        let is_there = |i: usize| occupied[i / 64] >> (i % 64) & 1 == 1;
+        met.into_iter().enumerate().filter(|(i, _)| is_there(*i)).map(|(_, met)| met).collect()
+    }
+
+    /// What the rays say of the scan at a pose.
+    fn look(&self, pose: &Pose, viewpoints: &[Arc<Viewpoint>], met: &[MetInMap]) -> RayAgreement {
+        let of_scan = self.points.iter().map(|point| {
+            let sights = viewpoints.iter().map(|viewpoint| self.sight_of(viewpoint, pose, *point));
+            majority(sights)
+        });
+        let sensor_from_map = pose.inverse();
+        let of_map = met.iter().map(|&MetInMap { place_m, error_m }| {
+            let offset = sensor_from_map * Point3::from(place_m);
+            self.image.sight(offset.coords.map(|c| c as f32).into(), self.tolerance_m + error_m)
+        });
+        RayAgreement { of_scan: RayCounts::of(of_scan), of_map: RayCounts::of(of_map) }
+    }
+
+    fn sight_of(&self, viewpoint: &Viewpoint, pose: &Pose, point: Point) -> Sight {
+        let place = pose * point.to_f64();
+        viewpoint.image().sight(viewpoint.offset(place.into()), self.tolerance_m)
+    }
+}
+
+/// What most of those say that say anything; agreement of as many as contradict.
+fn majority(sights: impl Iterator<Item = Sight>) -> Sight {
+    let (agree, contradict) = sights.fold((0, 0), |(agree, contradict), sight| match sight {
+        Sight::Agrees => (agree + 1, contradict),
+        Sight::Contradicts => (agree, contradict + 1),
+        Sight::Silent => (agree, contradict),
+    });
+    match (agree, contradict) {
+        (0, 0) => Sight::Silent,
+        _ if agree >= contradict => Sight::Agrees,
+        _ => Sight::Contradicts,
+    }
+}
+
+/// Some of the points, from all over a sample.
+fn spread(points: &[Point], wish: usize) -> Vec<Point> {
+    points.iter().step_by(points.len().div_ceil(wish).max(1)).copied().collect()
+}
+
+/// How the rays of a scan of `points` (sensor frame, meters) at a pose and those of the map's viewpoints agree; none in a map without
+/// viewpoints.
+pub fn ray_agreement(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    map_from_sensor: &Pose,
+    settings: &super::AlignmentSettings,
+) -> Option<RayAgreement> {
+    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, StopSignal::NEVER);
+    let rays = Rays::of(map, &scan)?;
+    let viewpoints = rays.viewpoints_for(map_from_sensor);
+    let met = Rays::met(map, &viewpoints);
+    Some(rays.look(map_from_sensor, &viewpoints, &met))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::AlignmentSettings;
+    use crate::map::{MapSettings, RobotName};
+    use crate::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
+
+    /// A scan from (x, y) in a room of 8 x 6 m about the origin with a pillar, a ray every `step_deg`; sensor frame.
+    fn scan(x: f32, y: f32, step_deg: f32) -> Vec<Point> {
+        let steps = |from: f32, to: f32| {
+            let count = ((to - from) / step_deg) as i32;
+            (0..count).map(move |i| (from + i as f32 * step_deg).to_radians())
+        };
+        let rays = steps(-20.0, 20.0).flat_map(|elevation| steps(0.0, 360.0).map(move |at| (elevation, at)));
+        rays.map(|(elevation, azimuth)| {
+            let (sin, cos) = azimuth.sin_cos();
+            let wall = |half: f32, from: f32, along: f32| (half.copysign(along) - from) / along;
+            // The pillar stands at (2, 1.5), 0.4 m wide.
+            let (dx, dy) = (2.0 - x, 1.5 - y);
+            let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            let pillar = if along > 0.0 && aside.abs() < 0.4 {
+                along - (0.16 - aside * aside).sqrt()
+            } else {
+                f32::MAX
+            };
+            let range = wall(4.0, x, cos).min(wall(3.0, y, sin)).min(pillar);
+            Point::new(range * cos, range * sin, range * elevation.tan())
+        })
+        .collect()
+    }
+
+    /// A map of scans from the places of `places`, whose rays lie `step_deg` apart.
+    fn map_of(places: &[(f32, f32)], resolution_m: f64, step_deg: f32) -> MultiResolutionMap {
+        let map = MultiResolutionMap::new(MapSettings::new(resolution_m, 5)).unwrap();
+        let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
+        let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+        for &(x, y) in places {
+            let (points, pose) = (scan(x, y, step_deg), Pose::translation(x.into(), y.into(), 0.0));
+            let scan = Scan { guess: Guess::Pose(pose), at_guess: true, ..Scan::new(&robot, &points) };
+            mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
+        }
+        map
+    }
+
+    #[test]
+    fn a_true_pose_agrees_whatever_the_voxels_the_rays_and_the_number_of_scans() {
+        let places = [(-2.0, -1.0), (-1.0, 0.5), (0.0, -1.5), (1.0, 0.0), (2.5, -2.0)];
+        for resolution_m in [0.04, 0.1, 0.2] {
+            for step_deg in [0.5, 1.0, 2.0] {
+                for scans in [1, 2, places.len()] {
+                    let map = map_of(&places[..scans], resolution_m, step_deg);
+                    let points = scan(-0.5, 0.3, step_deg);
+                    let at = |pose: &Pose| {
+                        ray_agreement(&map, &points, pose, &AlignmentSettings::default()).unwrap()
+                    };
+                    let truth = at(&Pose::translation(-0.5, 0.3, 0.0));
+                    let of = format!("{resolution_m} m, {step_deg} deg, {scans} scans: {truth:?}");
+                    assert!(truth.worse() > 0.95 && truth.evidence() > 0.5, "{of}");
+                    let aside = at(&Pose::translation(-0.5 + 12.0 * resolution_m, 0.3, 0.0));
+                    assert!(aside.worse() < truth.worse() - 0.02, "{of}, aside {aside:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_without_viewpoints_says_nothing() {
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
+        assert_eq!(
+            ray_agreement(&map, &scan(0.0, 0.0, 2.0), &Pose::identity(), &AlignmentSettings::default()),
+            None
+        );
+    }
+}
