@@ -4,6 +4,8 @@
 //! too, which belong nowhere. Simulated places, drawn by seed, are those in which robots mistake themselves: rectangular rooms in which
 //! a robot was turned unseen, and aisles that repeat.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -80,9 +82,8 @@ pub struct Outcomes {
     /// Accepted at the true pose.
     pub right: usize,
     /// Refused at the true pose, by [verdict](Verdict::as_str).
-    pub refused: std::collections::BTreeMap<&'static str, usize>,
-    /// Accepted at a wrong pose: how far off each is, meters and degrees, and the reason that was given. Of a scan of another place
-    /// nothing is how far off it is.
+    pub refused: BTreeMap<&'static str, usize>,
+    /// Accepted at a wrong pose: how far off each is, meters and degrees (none of a scan of another place), and the reason that was given.
     pub wrong: Vec<(Option<(f64, f64)>, String)>,
     /// Refused at a wrong pose.
     pub lost: usize,
@@ -194,8 +195,8 @@ impl Trials<'_> {
     }
 }
 
-/// Rectangular rooms drawn from `seed`, mapped by eight scans: the next scan after the robot was turned unseen by as much as looks the same,
-/// and after a step. The first half of the outcomes is of turned robots.
+/// Rectangular rooms drawn from `seed`, mapped by eight scans: the outcomes of the next scan after the robot was turned unseen, so that the
+/// walls look the same, and of one after a step. None where no map can be made.
 pub fn rooms(
     seed: u64,
     count: u64,
@@ -232,7 +233,7 @@ pub fn rooms(
 }
 
 /// A drive along an aisle with an upright every `period_m`, mapped at its true poses: the outcomes with odometry, and with the pose before
-/// as the guess.
+/// as the guess. None where no map can be made.
 pub fn aisle(seed: u64, period_m: f64, settings: &AlignmentSettings) -> Option<[Outcomes; 2]> {
     let mut outcomes = <[Outcomes; 2]>::default();
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -223,7 +223,7 @@ mod tests {
         rays.map(|(elevation, azimuth)| {
             let (sin, cos) = azimuth.sin_cos();
             let wall = |half: f32, from: f32, along: f32| (half.copysign(along) - from) / along;
-            // The pillar stands at (2, 1.5), 0.4 m wide.
+            // The pillar stands at (2, 1.5), 0.8 m wide.
             let (dx, dy) = (2.0 - x, 1.5 - y);
             let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
             let pillar = if along > 0.0 && aside.abs() < 0.4 {

@@ -106,7 +106,7 @@ impl Verdicts {
         for pieces in PIECES {
             for people in PEOPLE {
                 let [turned, stepped] =
-                    rooms(self.seed, self.rooms, pieces, people, settings).unwrap_or_default();
+                    rooms(self.seed, self.rooms, pieces, people, settings).ok_or_else(no_map)?;
                 bar.step();
                 bar.print(&Line::of(format!("room, {pieces} pieces, {people} people, turned"), turned))?;
                 bar.print(&Line::of(format!("room, {pieces} pieces, {people} people, a step"), stepped))?;
@@ -115,7 +115,7 @@ impl Verdicts {
         for period_m in PERIODS_M {
             for drive in 0..self.drives {
                 let [odometry, before] =
-                    aisle(self.seed.wrapping_add(drive), period_m, settings).unwrap_or_default();
+                    aisle(self.seed.wrapping_add(drive), period_m, settings).ok_or_else(no_map)?;
                 bar.step();
                 bar.print(&Line::of(format!("aisle, {period_m} m, odometry"), odometry))?;
                 bar.print(&Line::of(format!("aisle, {period_m} m, the pose before"), before))?;
@@ -123,6 +123,10 @@ impl Verdicts {
         }
         Ok(())
     }
+}
+
+fn no_map() -> CliError {
+    CliError::failed("no map of a simulated place could be made")
 }
 
 /// What came of some alignments.
@@ -176,9 +180,9 @@ struct Agreement {
     /// The smallest of the better shares at these, and the largest of the worse shares at wrong ones whose evidence suffices.
     least_right: f64,
     most_wrong: f64,
-    /// The smallest better share of the true poses of all other sets; and how many true poses of this set lie below it.
-    from_others: f64,
-    right_below: usize,
+    /// The smallest better share of the true poses of all other sets, and how many true poses of this set lie below it; none without others.
+    from_others: Option<f64>,
+    right_below: Option<usize>,
 }
 
 impl Agreement {
@@ -191,7 +195,7 @@ impl Agreement {
         };
         let of_set = |(k, (set, of)): (usize, &(String, Vec<[RayAgreement; 2]>))| {
             let others = pairs.iter().enumerate().filter(|(other, _)| *other != k);
-            let from_others = others.map(|(_, (_, of))| least(of)).fold(1.0, f64::min);
+            let from_others = others.map(|(_, (_, of))| least(of)).reduce(f64::min);
             let right = || of.iter().map(|[right, _]| right).filter(tells);
             let wrong = of.iter().map(|[_, wrong]| wrong).filter(tells);
             Self {
@@ -201,7 +205,7 @@ impl Agreement {
                 least_right: least(of),
                 most_wrong: wrong.map(RayAgreement::worse).fold(0.0, f64::max),
                 from_others,
-                right_below: right().filter(|right| right.better() < from_others).count(),
+                right_below: from_others.map(|least| right().filter(|right| right.better() < least).count()),
             }
         };
         pairs.iter().enumerate().map(of_set).collect()
@@ -212,9 +216,11 @@ impl Display for Agreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { set, with_evidence, scans, least_right, most_wrong, from_others, right_below } = self;
         let tells = format!("{with_evidence} of {scans}");
+        let from_others = from_others.map_or_else(|| "-".into(), |least| format!("{least:.3}"));
+        let right_below = right_below.map_or_else(|| "-".into(), |count| count.to_string());
         write!(
             f,
-            "{tells:>12}  {least_right:>22.3}  {most_wrong:>21.3}  {from_others:>17.3}  {right_below:>15}  {set}"
+            "{tells:>12}  {least_right:>22.3}  {most_wrong:>21.3}  {from_others:>17}  {right_below:>15}  {set}"
         )
     }
 }
