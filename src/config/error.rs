@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use mrol_map::mapping::CarvingSettingsError;
+use mrol_map::mapping::{CarvingSettingsError, OdometrySettingsError};
 use mrol_map::scan::PointFilterError;
 
 /// Why the settings are not valid.
@@ -73,5 +73,13 @@ pub enum ConfigError {
         name: String,
         /// What is wrong with it.
         error: CarvingSettingsError,
+    },
+    /// How far off the odometry of a robot is is not valid.
+    #[error("robots.{name}: {error}")]
+    RobotOdometry {
+        /// The name of the robot's table.
+        name: String,
+        /// What is wrong with it.
+        error: OdometrySettingsError,
     },
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::json::ByKeyword;
 use mrol_map::align::Method;
-use mrol_map::mapping::CarvingSettings;
+use mrol_map::mapping::{CarvingSettings, OdometrySettings};
 use mrol_map::scan::PointFilter;
 use mrol_service::RobotSettings;
 
@@ -40,11 +40,16 @@ pub struct RobotConfig {
     pub carve_grazing_deg: f64,
     /// Voxels farther from the sensor than this are not taken out, meters. 20.
     pub carve_range_max_m: f64,
+    /// Standard deviation of the length of a `motion`, as a share of it. 0.1.
+    pub odometry_way_share: f64,
+    /// Standard deviation of the turn of a `motion`, as a share of it. 0.1.
+    pub odometry_turn_share: f64,
 }
 
 impl Default for RobotConfig {
     fn default() -> Self {
         let CarvingSettings { margin_voxels, grazing_deg, range_max_m } = CarvingSettings::default();
+        let OdometrySettings { way_share, turn_share, .. } = OdometrySettings::default();
         Self {
             range_min_m: None,
             range_max_m: None,
@@ -55,6 +60,8 @@ impl Default for RobotConfig {
             carve_margin_voxels: margin_voxels,
             carve_grazing_deg: grazing_deg,
             carve_range_max_m: range_max_m,
+            odometry_way_share: way_share,
+            odometry_turn_share: turn_share,
         }
     }
 }
@@ -66,6 +73,7 @@ impl RobotConfig {
             recover: self.recover,
             carve: self.carve,
             carving: self.carving(),
+            odometry: self.odometry(),
         }
     }
 
@@ -74,6 +82,14 @@ impl RobotConfig {
             margin_voxels: self.carve_margin_voxels,
             grazing_deg: self.carve_grazing_deg,
             range_max_m: self.carve_range_max_m,
+        }
+    }
+
+    pub(super) fn odometry(&self) -> OdometrySettings {
+        OdometrySettings {
+            way_share: self.odometry_way_share,
+            turn_share: self.odometry_turn_share,
+            ..OdometrySettings::default()
         }
     }
 

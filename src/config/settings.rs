@@ -122,6 +122,9 @@ impl Config {
             if let Err(error) = robot.carving().checked() {
                 return Err(ConfigError::RobotCarving { name: name.clone(), error });
             }
+            if let Err(error) = robot.odometry().checked() {
+                return Err(ConfigError::RobotOdometry { name: name.clone(), error });
+            }
         }
         Ok(self)
     }

@@ -59,7 +59,7 @@ async fn a_scan_in_json_is_answered_in_full() {
     let expected = json!({
         "accepted": true, "verdict": "accepted", "reason": "the first scan of the map",
         "map_from_sensor": pose_json([1.0, 0.0, 0.0]), "overlap": 0.0, "level_overlaps": vec![0.0; 4],
-        "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "iterations": 0,
+        "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "rays": null, "rivals": [], "iterations": 0,
         "new_voxels": 2, "carved_voxels": 0, "points_skipped": 1, "replayed": false, "stationary": false, "recovered": null, "revision": 1,
         "map_uuid": uuid, "content_hash": hash,
     });

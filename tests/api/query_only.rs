@@ -115,8 +115,9 @@ async fn scans_are_aligned_by_overlap_and_undone_and_the_map_survives_a_restart(
     let aligned = json_of(daemon.post("/v1/maps/a/scans", scan).await).await;
     assert_eq!(aligned["verdict"], "accepted", "{aligned}");
     assert!(aligned["reason"].as_str().unwrap().contains("the map keeps no moments"), "{aligned}");
-    let deleted =
-        daemon.post("/v1/maps/a/deletions", json!({"box": {"min_m": [0, 0, 0], "max_m": [9, 9, 9]}})).await;
+    let deleted = daemon
+        .post("/v1/maps/a/deletions", json!({"box": {"min_m": [-9, -9, -9], "max_m": [9, 9, 9]}}))
+        .await;
     assert_eq!(deleted.status(), StatusCode::OK, "{:?}", deleted.text().await);
     let undone = daemon.post("/v1/maps/a/undo", json!({"revision": 3})).await;
     assert_eq!(undone.status(), StatusCode::OK, "{:?}", undone.text().await);

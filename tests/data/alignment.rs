@@ -1,11 +1,12 @@
 //! Real panoramic scans, meters apart, aligned from the pose of the scan before: in process, and through the
 //! running daemon over both protocols, to the same poses.
 
-use mrol::align::{AlignmentSettings, align};
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose, pose, pose_difference};
-use mrol::map::{MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol::map::{MapName, MapSettings, MultiResolutionMap, RobotName};
+use mrol::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
 use mrol::service::ScanRequest;
+use mrol::util::StopSignal;
 use serde_json::{Value, json};
 
 use crate::support::daemon::{Daemon, client, json_of};
@@ -16,18 +17,15 @@ const LEVELS: u32 = 6;
 
 fn in_process(set: &ScanSet) -> Vec<Pose> {
     let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, LEVELS)).unwrap();
-    let mut poses = vec![];
-    for k in 0..set.files.len() {
+    let (robot, sightings) = (robot(), Sightings::default());
+    let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+    let pose_of = |k: usize| {
         let points = set.points(k);
-        let map_from_sensor = match poses.last() {
-            None => Pose::identity(),
-            Some(last) => align(&map, &points, last, &AlignmentSettings::default()).map_from_sensor,
-        };
-        let pose = MappedScan::new(robot(), map_from_sensor);
-        map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
-        poses.push(map_from_sensor);
-    }
-    poses
+        let mapped = mapper.map_scan(&Scan::new(&robot, &points), StopSignal::NEVER).unwrap();
+        assert!(mapped.is_inserted(), "scan {k}: {}", mapped.located.alignment.reason);
+        mapped.located.alignment.map_from_sensor
+    };
+    (0..set.files.len()).map(pose_of).collect()
 }
 
 fn robot() -> RobotName {

@@ -25,7 +25,6 @@ const NONE: MultiStartSettings = MultiStartSettings {
     motion_above: f64::MAX,
     motion_above_deg: f64::MAX,
     ascents: 0,
-    ambiguous_fitness: 1.0,
 };
 
 struct Run {

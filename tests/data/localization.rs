@@ -5,7 +5,9 @@ use std::time::Instant;
 use mrol::align::localize::{Gravity, Localization, LocalizationQuery, LocalizationSettings, localize};
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Pose, pose_difference};
-use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
+use mrol::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol::util::StopSignal;
 use nalgebra::Vector3;
 
 use crate::support::shared_scans::{self, ScanSet};
@@ -36,9 +38,12 @@ impl Place {
     /// The map of the even scans, at their true poses.
     fn mapped(&self) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(self.resolution_m, 6)).unwrap();
+        let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
+        let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
         for (k, pose) in self.set.map_from_sensor.iter().enumerate().step_by(2) {
-            let pose = MappedScan::new(RobotName::new("r").unwrap(), *pose);
-            map.committer().insert_scan(ScanRecord::of_points(pose, &self.set.points(k), map.lattice()));
+            let points = self.set.points(k);
+            let scan = Scan { guess: Guess::Pose(*pose), at_guess: true, ..Scan::new(&robot, &points) };
+            mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
         }
         map
     }

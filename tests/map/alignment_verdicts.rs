@@ -128,7 +128,7 @@ fn a_scan_from_elsewhere_has_little_overlap() {
         .collect();
     let alignment = align(&map, &ball, &Pose::identity(), &AlignmentSettings::default());
     assert_eq!(alignment.verdict, Verdict::LowOverlap, "{}", alignment.reason);
-    assert!(alignment.reason.contains("below overlap_min 0.2"), "{}", alignment.reason);
+    assert!(alignment.reason.starts_with("0.000 and 0.000"), "{}", alignment.reason);
 }
 
 #[test]
@@ -151,7 +151,11 @@ fn a_square_room_without_furniture_fits_four_ways_round() {
     let settings = AlignmentSettings { multi_start, ..AlignmentSettings::default() };
     let alignment = align(&map, &scan, &guess, &settings);
     assert_eq!(alignment.verdict, Verdict::Ambiguous, "{}", alignment.reason);
-    assert!(alignment.reason.contains("90.0 deg away fits about as well"), "{}", alignment.reason);
+    let turned = alignment.rivals.iter().map(|rival| {
+        let (meters, degrees) = pose_difference(&rival.map_from_sensor, &alignment.map_from_sensor);
+        meters < 0.05 && (degrees - 90.0).abs() < 1.0
+    });
+    assert_eq!(turned.filter(|is_turned| *is_turned).count(), 2, "{:?}", alignment.rivals);
 }
 
 #[test]

@@ -222,11 +222,11 @@ pub fn points_pb(points: &[[f32; 3]]) -> Option<pb::Points> {
     Some(pb::Points { xyz_f32le: bytes_of(points).into(), xyz: Vec::new() })
 }
 
-/// A corner of three walls of 2 m, a point each 4 cm: nothing of a pose in it is open.
+/// A corner of three walls of 2 m, half a meter from the sensor, a point each 4 cm: nothing of a pose in it is open.
 pub fn corner() -> Vec<[f32; 3]> {
     let wall = |normal: usize| {
         (0..2500).map(move |i| {
-            let mut point = [(i % 50) as f32 * 0.04, (i / 50) as f32 * 0.04, 0.02];
+            let mut point = [(i % 50) as f32 * 0.04 - 0.5, (i / 50) as f32 * 0.04 - 0.5, 0.02 - 0.5];
             point.rotate_right(normal);
             point
         })

@@ -3,9 +3,8 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use mrol_client::align::Method;
-use mrol_client::align::PoseCovariance;
 use mrol_client::align::localize::{Gravity, LocalizationQuery, SearchBox};
+use mrol_client::align::{Method, PoseCovariance, RayAgreement};
 use mrol_client::bloom::FilterSettings;
 use mrol_client::geometry::Pose;
 use mrol_client::map::{MapName, MapSettings, RobotName};
@@ -128,6 +127,9 @@ fn answer_of<'py>(py: Python<'py>, answer: &ScanAnswer, points: usize) -> PyResu
     fields.set_item("information", answer.information)?;
     let undetermined: Vec<_> = answer.undetermined.iter().map(|of| (of.direction, of.std_m)).collect();
     fields.set_item("undetermined", undetermined)?;
+    fields.set_item("rays", answer.rays.map(sides_of))?;
+    let rivals = answer.rivals.iter().map(|of| (seven_of(&of.map_from_sensor), sides_of(of.agreement)));
+    fields.set_item("rivals", rivals.collect::<Vec<_>>())?;
     fields.set_item("iterations", answer.iterations)?;
     fields.set_item("align_ms", answer.align_time.as_secs_f64() * 1e3)?;
     fields.set_item("new_voxels", answer.new_voxels)?;
@@ -138,6 +140,11 @@ fn answer_of<'py>(py: Python<'py>, answer: &ScanAnswer, points: usize) -> PyResu
     let foreground = answer.foreground.as_ref().map(|of| of_bytes(py, &of.bitmap, points));
     fields.set_item("foreground", foreground)?;
     Ok(fields)
+}
+
+/// Asked, agree and contradicted, of the scan and of the map.
+fn sides_of(rays: RayAgreement) -> [[usize; 3]; 2] {
+    [rays.of_scan, rays.of_map].map(|side| [side.asked, side.agree, side.contradicted])
 }
 
 fn name() -> Result<MapName, Failure> {

@@ -115,6 +115,7 @@ ALIGNED = {
     "map_from_sensor": STANDS,
     "level_overlaps": [0],
     "undetermined": [],
+    "rivals": [],
     "foreground": [-1],
 }
 MAPPED = {

@@ -11,7 +11,7 @@ use super::resources::Gauges;
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::RobotName;
-use mrol_map::mapping::{CarvingSettings, StationarySettings};
+use mrol_map::mapping::{CarvingSettings, OdometrySettings, StationarySettings};
 use mrol_map::scan::PointFilter;
 use mrol_store::StoreSettings;
 
@@ -58,6 +58,8 @@ pub struct RobotSettings {
     pub carve: bool,
     /// How much is believed of what they saw through.
     pub carving: CarvingSettings,
+    /// How far off its odometry is.
+    pub odometry: OdometrySettings,
 }
 
 /// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.

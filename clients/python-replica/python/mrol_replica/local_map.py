@@ -4,7 +4,19 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mrol import Box, Candidate, Deletion, Localization, OpenDirection, Pose, ScanAnswer, Voxels
+from mrol import (
+    Box,
+    Candidate,
+    Deletion,
+    Localization,
+    OpenDirection,
+    Pose,
+    RayAgreement,
+    RayCounts,
+    Rival,
+    ScanAnswer,
+    Voxels,
+)
 from mrol._arrays import as_floats, as_numbers, number_of, rows_of, vector_of, whole_of
 from mrol._files import File, open_regular, path_of_file, replacing
 from mrol.errors import ArgumentError, excerpt
@@ -176,12 +188,19 @@ class LocalMap(Questions):
             "level_overlaps": np.array(told["level_overlaps"]),
             "information": None if information is None else np.array(information),
             "undetermined": tuple(OpenDirection(np.array(direction), std_m) for direction, std_m in told["undetermined"]),
+            "rays": None if told["rays"] is None else _rays(told["rays"]),
+            "rivals": tuple(Rival(Pose.of(pose), _rays(sides)) for pose, sides in told["rivals"]),
             "foreground": None if foreground is None else foreground.reshape(shape),
         }
         return ScanAnswer(replayed=False, robot=robot, session="", scan_id=None, **told)
 
     def __repr__(self) -> str:
         return "<mrol map of this process>"
+
+
+def _rays(sides: "list[list[int]]") -> RayAgreement:
+    of_scan, of_map = (RayCounts(*side) for side in sides)
+    return RayAgreement(of_scan, of_map)
 
 
 def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":

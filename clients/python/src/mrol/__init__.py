@@ -49,7 +49,7 @@ from .operations.nearest import Nearest
 from .operations.observers import Observers, ObservingScan
 from .operations.occupancy import Occupancy
 from .operations.rays import Rays
-from .operations.scans import OpenDirection, ScanAnswer
+from .operations.scans import OpenDirection, RayAgreement, RayCounts, Rival, ScanAnswer
 from .operations.trajectory import MappedScan, Trajectory
 from .operations.undo import Undo
 from .operations.voxels import View, Voxels
@@ -120,8 +120,11 @@ __all__ = [
     "PermissionDenied",
     "Pose",
     "Prism",
+    "RayAgreement",
+    "RayCounts",
     "Rays",
     "ResourceExhausted",
+    "Rival",
     "ScanAnswer",
     "ScanEvent",
     "ServerError",

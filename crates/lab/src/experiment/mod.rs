@@ -5,7 +5,6 @@ pub mod convergence;
 pub mod deskewing;
 pub mod drift;
 pub mod free_space;
-pub mod hostile_guesses;
 pub mod mapping;
 pub mod rounds;
 pub mod stages;

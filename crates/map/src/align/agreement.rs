@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
+use super::marched;
 use super::sampled_scan::SampledScan;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
@@ -21,14 +22,21 @@ const POINTS: usize = 800;
 const POINTS_OF_VIEWPOINT: usize = 500;
 /// Viewpoints that are asked.
 const VIEWPOINTS: usize = 8;
+/// Viewpoints that are asked for each pose, at least.
+const VIEWPOINTS_OF_POSE: usize = 2;
 /// Viewpoints near a pose among which those are chosen that saw most of what the scan shows.
 const NEAR: usize = 32;
 /// Points that tell how much of it a viewpoint saw.
 const POINTS_TO_CHOOSE: usize = 64;
 /// Depths that differ by so many r_0 are the same.
 const TOLERANCE: f64 = 2.0;
+/// What a viewpoint met counts where its image tells the place to so many of these tolerances.
+const ERROR_MAX: f32 = 2.0;
 /// The level whose voxels tell whether the map still holds what a viewpoint met.
 const STILL_THERE_LEVEL: u32 = 2;
+/// How many times the deviation of as many single points the difference between two poses has that are equal in truth: points beside
+/// each other are met or missed together. Of 800 and 8 times 500 points; measured in a test.
+const CLUSTERING: f64 = 1.6;
 
 /// What rays of one side say of a pose: a number of points that were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -46,29 +54,54 @@ pub struct RayCounts {
 pub struct RayAgreement {
     /// The scan's points, in the images of the viewpoints.
     pub of_scan: RayCounts,
-    /// What the viewpoints met, in the image of the scan.
+    /// What the viewpoints met and the scan looks at, in the image of the scan.
     pub of_map: RayCounts,
+}
+
+/// A pose that a scan may have been taken at as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rival {
+    /// Where: map_from_sensor.
+    pub map_from_sensor: Pose,
+    /// How rays agree there.
+    pub agreement: RayAgreement,
 }
 
 /// What is asked of the rays of a scan, made once for all poses.
 #[derive(Debug)]
-struct Rays {
+pub(super) struct Rays {
     image: ScanImage,
     points: Vec<Point>,
     viewpoints: Arc<ViewpointSet>,
     tolerance_m: f32,
 }
 
+/// The viewpoints that are asked about a scan, the same for all poses that are compared.
+#[derive(Debug)]
+pub(super) struct Witnesses {
+    viewpoints: Vec<Arc<Viewpoint>>,
+    /// What they met, and the map still holds.
+    met: Vec<MetInMap>,
+}
+
 /// A place that a viewpoint met, and the map still holds.
+#[derive(Debug)]
 struct MetInMap {
     place_m: [f64; 3],
     /// As [`Met::error_m`].
     error_m: f32,
 }
 
+/// What each point says of a scan at a pose: those of the scan, and those that the witnesses met.
+#[derive(Debug)]
+pub(super) struct Look {
+    of_scan: Vec<Sight>,
+    of_map: Vec<Sight>,
+}
+
 impl RayCounts {
-    fn of(sights: impl Iterator<Item = Sight>) -> Self {
-        sights.fold(Self::default(), |counts, sight| Self {
+    fn of(sights: impl IntoIterator<Item = Sight>) -> Self {
+        sights.into_iter().fold(Self::default(), |counts, sight| Self {
             asked: counts.asked + 1,
             agree: counts.agree + usize::from(sight == Sight::Agrees),
             contradicted: counts.contradicted + usize::from(sight == Sight::Contradicts),
@@ -78,6 +111,11 @@ impl RayCounts {
     /// The share of points that agree, of those of which anything is known; 0 where nothing is.
     pub fn share(&self) -> f64 {
         self.agree as f64 / (self.agree + self.contradicted).max(1) as f64
+    }
+
+    /// The share of points that are contradicted, of those of which anything is known; 0 where nothing is.
+    pub fn contradicted_share(&self) -> f64 {
+        self.contradicted as f64 / (self.agree + self.contradicted).max(1) as f64
     }
 
     /// The share of all points that agree.
@@ -104,66 +142,97 @@ impl RayAgreement {
 }
 
 impl Rays {
-    /// The rays of a scan; none in a map without viewpoints.
-    fn of(map: &MultiResolutionMap, scan: &SampledScan<'_>) -> Option<Self> {
-        let viewpoints = map.viewpoints();
-        if viewpoints.is_empty() {
-            return None;
-        }
+    /// The rays of a scan.
+    pub(super) fn of(map: &MultiResolutionMap, scan: &SampledScan<'_>) -> Self {
         let points = spread(&scan.surface_sample, POINTS);
         let tolerance_m = (TOLERANCE * map.lattice().resolution_m(0)) as f32;
-        Some(Self { image: ScanImage::of(scan.points), points, viewpoints, tolerance_m })
+        Self { image: ScanImage::of(scan.points), points, viewpoints: map.viewpoints(), tolerance_m }
     }
 
-    /// The viewpoints to ask about a scan at a pose: of those near to it, those that saw most of what it shows there.
-    fn viewpoints_for(&self, pose: &Pose) -> Vec<Arc<Viewpoint>> {
+    /// The witnesses of a scan that was taken at one of some poses: for each, of the viewpoints near to it those that saw most of
+    /// what the scan shows there.
+    pub(super) fn witnesses(
+        &self,
+        map: &MultiResolutionMap,
+        poses: &[Pose],
+        stop: StopSignal<'_>,
+    ) -> Witnesses {
+        let mut viewpoints: Vec<Arc<Viewpoint>> = Vec::new();
+        for pose in poses {
+            let wish = VIEWPOINTS.div_ceil(poses.len()).max(VIEWPOINTS_OF_POSE);
+            for viewpoint in self.viewpoints_for(map, pose, wish, stop) {
+                if !viewpoints.iter().any(|other| Arc::ptr_eq(other, &viewpoint)) {
+                    viewpoints.push(viewpoint);
+                }
+            }
+        }
+        let met = met(map, &viewpoints, self.tolerance_m);
+        Witnesses { viewpoints, met }
+    }
+
+    fn viewpoints_for(
+        &self,
+        map: &MultiResolutionMap,
+        pose: &Pose,
+        wish: usize,
+        stop: StopSignal<'_>,
+    ) -> Vec<Arc<Viewpoint>> {
         let distance_m = |viewpoint: &Viewpoint| {
             (viewpoint.map_from_sensor().translation.vector - pose.translation.vector).norm()
         };
-        let mut near: Vec<_> = self.viewpoints.iter().map(|(_, it)| (distance_m(it), it)).collect();
+        let mut near: Vec<_> =
+            self.viewpoints.iter().map(|(_, it)| (distance_m(it), Arc::clone(it))).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         near.truncate(NEAR);
+        let nearest_m = near.first().map_or(f64::INFINITY, |(distance_m, _)| *distance_m);
+        let marched = marched::viewpoints_near(map, pose, nearest_m, wish, stop);
+        near.extend(marched.into_iter().map(|viewpoint| (distance_m(&viewpoint), viewpoint)));
         let few = spread(&self.points, POINTS_TO_CHOOSE);
         let tells = |viewpoint: &Viewpoint| {
             let sights = few.iter().map(|point| self.sight_of(viewpoint, pose, *point));
-            sights.filter(|sight| *sight != Sight::Silent).count()
+            sights.filter(|sight| matches!(sight, Sight::Agrees | Sight::Contradicts)).count()
         };
-        let mut ranked: Vec<_> = near.into_iter().map(|(_, it)| (tells(it), it)).collect();
+        let mut ranked: Vec<_> = near.into_iter().map(|(_, it)| (tells(&it), it)).collect();
         ranked.sort_by_key(|(tells, _)| Reverse(*tells));
-        ranked.into_iter().take(VIEWPOINTS).map(|(_, viewpoint)| Arc::clone(viewpoint)).collect()
+        // One that looked elsewhere makes little of what the others agree on.
+        let most = ranked.first().map_or(0, |(tells, _)| *tells);
+        ranked.retain(|(tells, _)| 2 * tells >= most);
+        ranked.into_iter().take(wish).map(|(_, viewpoint)| viewpoint).collect()
     }
 
-    /// What the viewpoints met, and the map still holds.
-    fn met(map: &MultiResolutionMap, viewpoints: &[Arc<Viewpoint>]) -> Vec<MetInMap> {
-        let of_viewpoint = |viewpoint: &Arc<Viewpoint>| {
-            let map_from_sensor = *viewpoint.map_from_sensor();
-            let met = viewpoint.image().met(POINTS_OF_VIEWPOINT).into_iter();
-            met.map(move |Met { offset, error_m }| MetInMap {
-                place_m: (map_from_sensor * Point3::from(offset.map(f64::from))).into(),
-                error_m,
-            })
-        };
-        let met: Vec<MetInMap> = viewpoints.iter().flat_map(of_viewpoint).collect();
-        let points: Vec<Point> = met.iter().map(|met| Point::from(Point3::from(met.place_m))).collect();
-        let mut occupied = vec![0u64; points.len().div_ceil(64)];
-        let level = STILL_THERE_LEVEL.min(map.lattice().levels() - 1);
-        map.view().query(&points, &map.lattice().from_map(), level, Lookup::Exact, &mut occupied);
-        let is_there = |i: usize| occupied[i / 64] >> (i % 64) & 1 == 1;
-        met.into_iter().enumerate().filter(|(i, _)| is_there(*i)).map(|(_, met)| met).collect()
-    }
-
-    /// What the rays say of the scan at a pose.
-    fn look(&self, pose: &Pose, viewpoints: &[Arc<Viewpoint>], met: &[MetInMap]) -> RayAgreement {
+    /// What the rays say of the scan at a pose. Once `stop` is set, nothing.
+    pub(super) fn look(&self, pose: &Pose, witnesses: &Witnesses, stop: StopSignal<'_>) -> Look {
+        if stop.is_stopped() {
+            return Look { of_scan: Vec::new(), of_map: Vec::new() };
+        }
         let of_scan = self.points.iter().map(|point| {
-            let sights = viewpoints.iter().map(|viewpoint| self.sight_of(viewpoint, pose, *point));
+            let sights = witnesses.viewpoints.iter().map(|viewpoint| self.sight_of(viewpoint, pose, *point));
             majority(sights)
         });
         let sensor_from_map = pose.inverse();
-        let of_map = met.iter().map(|&MetInMap { place_m, error_m }| {
+        let of_map = witnesses.met.iter().map(|&MetInMap { place_m, error_m }| {
             let offset = sensor_from_map * Point3::from(place_m);
             self.image.sight(offset.coords.map(|c| c as f32).into(), self.tolerance_m + error_m)
         });
-        RayAgreement { of_scan: RayCounts::of(of_scan), of_map: RayCounts::of(of_map) }
+        Look { of_scan: of_scan.collect(), of_map: of_map.collect() }
+    }
+
+    /// The share of what each witness met that another one contradicts, of what it says anything of: what moved, and what images are
+    /// too coarse for.
+    pub(super) fn contradicted_among(&self, witnesses: &Witnesses) -> f64 {
+        let Witnesses { viewpoints, .. } = witnesses;
+        let sights = viewpoints.iter().flat_map(|viewpoint| {
+            let others = viewpoints.iter().filter(move |other| !Arc::ptr_eq(other, viewpoint));
+            let met = viewpoint.image().met(POINTS_TO_CHOOSE, ERROR_MAX * self.tolerance_m);
+            others.flat_map(move |other| {
+                let of_met = |&Met { offset, error_m }: &Met| {
+                    let place = viewpoint.map_from_sensor() * Point3::from(offset.map(f64::from));
+                    other.image().sight(other.offset(place.into()), self.tolerance_m + error_m)
+                };
+                met.iter().map(of_met).collect::<Vec<_>>()
+            })
+        });
+        RayCounts::of(sights).contradicted_share()
     }
 
     fn sight_of(&self, viewpoint: &Viewpoint, pose: &Pose, point: Point) -> Sight {
@@ -172,38 +241,86 @@ impl Rays {
     }
 }
 
+impl Look {
+    /// How many points agree, and how many are contradicted.
+    pub(super) fn agreement(&self) -> RayAgreement {
+        // New ground is what the scan shows and nobody saw; what it does not look at is nothing to it.
+        let in_view = self.of_map.iter().copied().filter(|sight| *sight != Sight::NotSeen);
+        RayAgreement { of_scan: RayCounts::of(self.of_scan.iter().copied()), of_map: RayCounts::of(in_view) }
+    }
+
+    /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of the difference
+    /// between two poses that are equal in truth: z = (a - b) / sqrt(a + b) / [`CLUSTERING`], of the points that contradict here
+    /// alone (a) and there alone (b).
+    pub(super) fn contradicted_more_than(&self, other: &Self) -> f64 {
+        let pairs = self.of_scan.iter().zip(&other.of_scan).chain(self.of_map.iter().zip(&other.of_map));
+        let (here, there) = pairs.fold((0.0, 0.0), |(here, there), (a, b)| {
+            match (*a == Sight::Contradicts, *b == Sight::Contradicts) {
+                (true, false) => (here + 1.0, there),
+                (false, true) => (here, there + 1.0),
+                _ => (here, there),
+            }
+        });
+        if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) / CLUSTERING }
+    }
+}
+
+/// What viewpoints met, the map still holds, and no other one of them saw through: at rims and on glass they differ.
+fn met(map: &MultiResolutionMap, viewpoints: &[Arc<Viewpoint>], tolerance_m: f32) -> Vec<MetInMap> {
+    let of_viewpoint = |viewpoint: &Arc<Viewpoint>| {
+        let map_from_sensor = *viewpoint.map_from_sensor();
+        let met = viewpoint.image().met(POINTS_OF_VIEWPOINT, ERROR_MAX * tolerance_m).into_iter();
+        met.map(move |Met { offset, error_m }| MetInMap {
+            place_m: (map_from_sensor * Point3::from(offset.map(f64::from))).into(),
+            error_m,
+        })
+    };
+    let met: Vec<MetInMap> = viewpoints.iter().flat_map(of_viewpoint).collect();
+    let points: Vec<Point> = met.iter().map(|met| Point::from(Point3::from(met.place_m))).collect();
+    let mut occupied = vec![0u64; points.len().div_ceil(64)];
+    let level = STILL_THERE_LEVEL.min(map.lattice().levels() - 1);
+    map.view().query(&points, &map.lattice().from_map(), level, Lookup::Exact, &mut occupied);
+    let is_there = |i: usize| occupied[i / 64] >> (i % 64) & 1 == 1;
+    let is_seen_through = |met: &MetInMap| {
+        let sights = viewpoints.iter().map(|viewpoint| {
+            viewpoint.image().sight(viewpoint.offset(met.place_m), tolerance_m + met.error_m)
+        });
+        sights.into_iter().any(|sight| sight == Sight::Contradicts)
+    };
+    let met = met.into_iter().enumerate().filter(|(i, met)| is_there(*i) && !is_seen_through(met));
+    met.map(|(_, met)| met).collect()
+}
+
 /// What most of those say that say anything; agreement of as many as contradict.
 fn majority(sights: impl Iterator<Item = Sight>) -> Sight {
     let (agree, contradict) = sights.fold((0, 0), |(agree, contradict), sight| match sight {
         Sight::Agrees => (agree + 1, contradict),
         Sight::Contradicts => (agree, contradict + 1),
-        Sight::Silent => (agree, contradict),
+        Sight::Hidden | Sight::NotSeen => (agree, contradict),
     });
     match (agree, contradict) {
-        (0, 0) => Sight::Silent,
+        (0, 0) => Sight::NotSeen,
         _ if agree >= contradict => Sight::Agrees,
         _ => Sight::Contradicts,
     }
 }
 
 /// Some of the points, from all over a sample.
-fn spread(points: &[Point], wish: usize) -> Vec<Point> {
+pub(super) fn spread(points: &[Point], wish: usize) -> Vec<Point> {
     points.iter().step_by(points.len().div_ceil(wish).max(1)).copied().collect()
 }
 
-/// How the rays of a scan of `points` (sensor frame, meters) at a pose and those of the map's viewpoints agree; none in a map without
-/// viewpoints.
+/// How the rays of a scan of `points` (sensor frame, meters) at a pose and those of the map's viewpoints agree.
 pub fn ray_agreement(
     map: &MultiResolutionMap,
     points: &[Point],
     map_from_sensor: &Pose,
     settings: &super::AlignmentSettings,
-) -> Option<RayAgreement> {
+) -> RayAgreement {
     let scan = SampledScan::new(points, map.lattice().extent_m(), settings, StopSignal::NEVER);
-    let rays = Rays::of(map, &scan)?;
-    let viewpoints = rays.viewpoints_for(map_from_sensor);
-    let met = Rays::met(map, &viewpoints);
-    Some(rays.look(map_from_sensor, &viewpoints, &met))
+    let rays = Rays::of(map, &scan);
+    let witnesses = rays.witnesses(map, &[*map_from_sensor], StopSignal::NEVER);
+    rays.look(map_from_sensor, &witnesses, StopSignal::NEVER).agreement()
 }
 
 #[cfg(test)]
@@ -211,7 +328,7 @@ mod tests {
     use super::*;
     use crate::align::AlignmentSettings;
     use crate::map::{MapSettings, RobotName};
-    use crate::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
+    use crate::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings, ViewpointSettings};
 
     /// A scan from (x, y) in a room of 8 x 6 m about the origin with a pillar, a ray every `step_deg`; sensor frame.
     fn scan(x: f32, y: f32, step_deg: f32) -> Vec<Point> {
@@ -258,9 +375,7 @@ mod tests {
                 for scans in [1, 2, places.len()] {
                     let map = map_of(&places[..scans], resolution_m, step_deg);
                     let points = scan(-0.5, 0.3, step_deg);
-                    let at = |pose: &Pose| {
-                        ray_agreement(&map, &points, pose, &AlignmentSettings::default()).unwrap()
-                    };
+                    let at = |pose: &Pose| ray_agreement(&map, &points, pose, &AlignmentSettings::default());
                     let truth = at(&Pose::translation(-0.5, 0.3, 0.0));
                     let of = format!("{resolution_m} m, {step_deg} deg, {scans} scans: {truth:?}");
                     assert!(truth.worse() > 0.95 && truth.evidence() > 0.5, "{of}");
@@ -272,11 +387,29 @@ mod tests {
     }
 
     #[test]
-    fn a_map_without_viewpoints_says_nothing() {
-        let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
-        assert_eq!(
-            ray_agreement(&map, &scan(0.0, 0.0, 2.0), &Pose::identity(), &AlignmentSettings::default()),
-            None
-        );
+    fn a_map_without_viewpoints_tells_what_its_scans_must_have_seen() {
+        let mut settings = MapSettings::new(0.1, 5);
+        settings.moments = true;
+        let map = MultiResolutionMap::new(settings).unwrap();
+        let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
+        let viewpoints = ViewpointSettings { bytes_max: 0, ..ViewpointSettings::default() };
+        let mapper =
+            ScanMapper::new(&map, &sightings, MappingSettings { viewpoints, ..MappingSettings::default() });
+        for (x, y) in [(-2.0, -1.0), (0.0, 0.5), (1.5, -1.0)] {
+            let (points, pose) = (scan(x, y, 1.0), Pose::translation(x.into(), y.into(), 0.0));
+            let scan = Scan { guess: Guess::Pose(pose), at_guess: true, ..Scan::new(&robot, &points) };
+            mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
+        }
+        assert!(map.viewpoints().is_empty());
+        let points = scan(-0.5, 0.3, 1.0);
+        let at = |x: f64, y: f64, turn: f64| {
+            let pose = Pose::new(nalgebra::Vector3::new(x, y, 0.0), nalgebra::Vector3::z() * turn);
+            ray_agreement(&map, &points, &pose, &AlignmentSettings::default())
+        };
+        let truth = at(-0.5, 0.3, 0.0);
+        assert!(truth.worse() > 0.95 && truth.evidence() > 0.4, "{truth:?}");
+        let (aside, turned) = (at(0.7, 0.3, 0.0), at(0.5, -0.3, std::f64::consts::PI));
+        assert!(aside.better() < truth.worse() - 0.02, "{aside:?} {truth:?}");
+        assert!(turned.worse() < truth.worse(), "{turned:?} {truth:?}");
     }
 }

@@ -8,8 +8,11 @@
 //! sequential      align, align_until    the composing function
 //! sampled_scan    step 1                a volumetric sample (III-A)
 //! stages          steps 2 to 5          an ascent at each level (ascent, overlap), and the sub-voxel stage (refine)
-//! verdict                               whether to believe the pose (information, slide, free_space, prior)
-//! agreement       ray_agreement         whether rays of scan and map agree, which no verdict asks yet
+//! verdict                               whether to believe the pose (information, slide, prior)
+//! agreement       ray_agreement         whether rays of scan and map agree
+//! marched                               what earlier scans must have seen, where they left no viewpoints
+//! rivals, ends    Contest, Ends         which of several ends to believe, by rays and by what is known beforehand
+//! elsewhere                             where else the scan may fit as well
 //! multi_start                           further guesses, where the first ends badly
 //! localize                              no guess at all
 //! ```
@@ -21,15 +24,18 @@
 
 mod agreement;
 mod ascent;
+mod elsewhere;
+mod ends;
 mod extent;
-mod free_space;
 mod gravity;
 mod information;
 pub mod localize;
+mod marched;
 mod multi_start;
 mod overlap;
 mod prior;
 mod refine;
+mod rivals;
 mod sampled_scan;
 mod sequential;
 mod settings;
@@ -39,8 +45,7 @@ mod stages;
 mod tests;
 mod verdict;
 
-pub use agreement::{RayAgreement, RayCounts, ray_agreement};
-pub use free_space::{Contradiction, FreeSpaceSettings};
+pub use agreement::{RayAgreement, RayCounts, Rival, ray_agreement};
 pub use information::{Direction, PoseInformation};
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
 pub use prior::{PoseCovariance, PoseCovarianceError, PosePrior};

@@ -1,6 +1,6 @@
 //! The prior of an alignment: what is known of a scan's pose before it is looked at.
 
-use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector6};
+use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector2, Vector6};
 
 use super::gravity::Gravity;
 use super::settings::AlignmentSettings;
@@ -14,6 +14,12 @@ pub struct PosePrior {
     pub guess: Pose,
     /// How far off the guess may be; without, as far as an alignment looks.
     pub covariance: Option<PoseCovariance>,
+    /// How far off it is expected to be where no covariance says so: it speaks for poses near the guess, and rules none
+    /// out.
+    pub expected: Option<PoseCovariance>,
+    /// The robot may have turned unseen, so that the guess tells nothing of which way it looks, where no covariance does: as after a
+    /// time that nobody knows, since its last pose.
+    pub may_have_turned: bool,
     /// Direction of gravity, as an accelerometer tells.
     pub gravity: Option<Gravity>,
 }
@@ -75,6 +81,27 @@ impl PoseCovariance {
         Ok(Self(matrix))
     }
 
+    /// That of a pose which may be off by these standard deviations in every direction and about every axis, at most by those of a
+    /// pose of which nothing is known.
+    pub fn isotropic(std_m: f64, std_rad: f64) -> Self {
+        let (meters, radians) =
+            (std_m.clamp(0.0, WIDE_M).powi(2), std_rad.clamp(0.0, WIDE_DEG.to_radians()).powi(2));
+        Self(Matrix6::from_diagonal(&Vector6::new(meters, meters, meters, radians, radians, radians)))
+    }
+
+    /// That of a guess of which nothing else is known.
+    fn wide() -> Self {
+        Self::isotropic(WIDE_M, WIDE_DEG.to_radians())
+    }
+
+    /// This covariance, of which the turn about the map's z axis is not known.
+    fn with_open_yaw(mut self) -> Self {
+        self.0.row_mut(5).fill(0.0);
+        self.0.column_mut(5).fill(0.0);
+        self.0[(5, 5)] = OPEN_RAD * OPEN_RAD;
+        self
+    }
+
     /// The 36 numbers, row by row.
     pub fn rows(&self) -> [f64; 36] {
         std::array::from_fn(|k| self.0[(k / 6, k % 6)])
@@ -99,10 +126,18 @@ impl PoseCovariance {
 /// Angle to which a pose is found, degrees: see [`PoseCovariance`].
 const FOUND_DEG: f64 = 1.0;
 
+/// Standard deviations of a guess of which nothing else is known: meters and degrees.
+pub(super) const WIDE_M: f64 = 2.0;
+pub(super) const WIDE_DEG: f64 = 40.0;
+/// Three standard deviations of a yaw that may be another one altogether, degrees.
+const YAW_OPEN_DEG: f64 = 30.0;
+/// Standard deviation of a turn of which nothing is known, radians: no turn is farther than one of them.
+const OPEN_RAD: f64 = 100.0;
+
 impl From<Pose> for PosePrior {
     /// A guess of which nothing else is known.
     fn from(guess: Pose) -> Self {
-        Self { guess, covariance: None, gravity: None }
+        Self { guess, covariance: None, expected: None, may_have_turned: true, gravity: None }
     }
 }
 
@@ -116,6 +151,38 @@ impl PosePrior {
             return self.guess;
         };
         Pose::from_parts(self.guess.translation, turn * self.guess.rotation)
+    }
+
+    /// How far off the guess may be, by all that is known of it.
+    fn spread(&self) -> PoseCovariance {
+        self.covariance.or(self.expected).unwrap_or_else(PoseCovariance::wide)
+    }
+
+    /// How many standard deviations of what is known beforehand `pose` (map_from_sensor) is from the guess. Voxels of the finest level
+    /// have sides of `resolution_m`.
+    pub(super) fn deviations(&self, pose: &Pose, resolution_m: f64) -> f64 {
+        let covariance = self.spread();
+        covariance.deviations(&self.leveled_guess(), pose, resolution_m, FOUND_DEG.to_radians())
+    }
+
+    /// True where the scan may have been taken turned by a step of the yaws that are tried.
+    pub(super) fn leaves_yaw_open(&self) -> bool {
+        let variance = self.spread().0[(5, 5)];
+        let is_told = self.covariance.is_some() || self.expected.is_some();
+        3.0 * variance.sqrt() >= YAW_OPEN_DEG.to_radians() && (is_told || self.may_have_turned)
+    }
+
+    /// Three standard deviations along a direction on the floor (of length 1), meters.
+    pub(super) fn possible_m(&self, axis: Vector2<f64>) -> f64 {
+        let covariance = self.spread();
+        let along = Vector6::new(axis.x, axis.y, 0.0, 0.0, 0.0, 0.0);
+        3.0 * along.dot(&(covariance.0 * along)).max(0.0).sqrt()
+    }
+
+    /// This prior, of which the turn about the map's z axis is not known.
+    pub(super) fn with_open_yaw(self) -> Self {
+        let covariance = self.spread();
+        Self { covariance: None, expected: Some(covariance.with_open_yaw()), ..self }
     }
 
     /// True of a pose (map_from_sensor) that contradicts what is known of it beforehand. Voxels of the finest level have

@@ -1,14 +1,15 @@
 //! Sequential alignment (paper III-B): the composing functions.
 
+use super::agreement::Rays;
 use super::ascent::Ascent;
-use super::free_space::Contradiction;
 use super::multi_start;
 use super::overlap::OccupiedVoxels;
 use super::prior::PosePrior;
+use super::rivals::Contest;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
 use super::stages::{climb, climb_sub_voxel, finish, fit};
-use super::verdict::{Alignment, Verdict};
+use super::verdict::Alignment;
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
@@ -38,41 +39,42 @@ pub fn align_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, stop);
+    let scan = &SampledScan::new(points, map.lattice().extent_m(), settings, stop);
     let guess = prior.leveled_guess();
-    let ascent = climb(map, &scan, guess, map.settings().levels - 1, settings);
-    let found = finish(map, &scan, ascent, settings);
-    let found = match found.is_doubtful(&guess, map, settings) && !stop.is_stopped() {
-        true if settings.multi_start.ascents == 0 => Alignment { wants_more_starts: true, ..found },
-        true => multi_start::align(map, &scan, &PosePrior { guess, ..*prior }, found, settings),
-        false => found,
-    };
-    let found = found.within_max_correction(&guess, map, settings).within_prior(prior, map, settings);
-    uncontradicted(found, map, &scan, &guess, settings)
+    let prior = &PosePrior { guess, ..*prior };
+
+    // 1) - 5) from the guess. The coarse levels find what is far from it, and pull away from what is near: both ends are looked at.
+    let coarsest = map.settings().levels - 1;
+    let from_coarse = climb(map, scan, guess, coarsest, settings);
+    let mut ends = vec![finish(map, scan, from_coarse, settings)];
+    let from_fine = climb(map, scan, guess, FINE.min(coarsest), settings);
+    let (meters, degrees) = pose_difference(&from_fine.pose, &from_coarse.pose);
+    if meters > map.lattice().resolution_m(0) || degrees > SAME_END_DEG {
+        ends.push(finish(map, scan, from_fine, settings));
+    }
+
+    // From other guesses around it, where that ended badly.
+    let is_doubtful = ends[0].is_doubtful(&guess, map, settings) && !stop.is_stopped();
+    let wants_more_starts = is_doubtful && settings.multi_start.ascents == 0;
+    let mut lookups = 0;
+    if is_doubtful && !wants_more_starts {
+        let (found, of_guesses) = multi_start::ends(map, scan, prior, settings);
+        lookups += of_guesses;
+        ends.extend(found);
+    }
+
+    // Which of the ends to believe, and whether.
+    let rays = &Rays::of(map, scan);
+    let found = Contest { map, scan, rays, settings }.decide(ends, prior);
+    let wants_more_starts = wants_more_starts || found.wants_more_starts;
+    let lookups = lookups + found.lookups;
+    Alignment { wants_more_starts, lookups, ..found }.within_prior(prior, map, settings)
 }
 
-/// The alignment, refused where it lies far from its guess and free space contradicts it.
-fn uncontradicted(
-    found: Alignment,
-    map: &MultiResolutionMap,
-    scan: &SampledScan<'_>,
-    guess: &Pose,
-    settings: &AlignmentSettings,
-) -> Alignment {
-    let (pose, free_space) = (&found.map_from_sensor, &settings.free_space);
-    let correction = pose_difference(guess, pose);
-    let is_asked = free_space.is_asked_at(correction, map.lattice().resolution_m(0));
-    if found.verdict != Verdict::Accepted || !is_asked {
-        return found;
-    }
-    let contradiction = Contradiction::of(map, &scan.surface_sample, pose, free_space, scan.stop);
-    let contradiction = contradiction.with_overlaps(&found.level_overlaps);
-    let found = Alignment { contradiction, ..found };
-    match contradiction.reason(&settings.free_space) {
-        Some(reason) => found.but(Verdict::Contradicted, reason),
-        None => found,
-    }
-}
+/// The coarsest level of the ascent that the coarse ones cannot pull away from its guess.
+const FINE: u32 = 1;
+/// Ascents that end nearer to each other than r_0 and so many degrees are refined as one.
+const SAME_END_DEG: f64 = 1.0;
 
 /// Judges how a scan fits the map at the pose `map_from_sensor`, without moving it.
 pub fn evaluate_at(

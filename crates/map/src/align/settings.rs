@@ -1,6 +1,5 @@
 //! Settings of the alignment.
 
-use super::free_space::FreeSpaceSettings;
 use crate::map::Lookup;
 use crate::util::Keyword;
 
@@ -54,8 +53,8 @@ pub struct AlignmentSettings {
     pub refinement: RefinementSettings,
     /// What to try where the ascent from the guess ends badly.
     pub multi_start: MultiStartSettings,
-    /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted. 0.2: even a step
-    /// that shows mostly new ground shares more than that with the map, a scan from elsewhere less.
+    /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say. 0: how much that is
+    /// depends on how densely the map is filled.
     pub overlap_min: f64,
     /// A pose is undetermined where its standard deviation in some direction exceeds this fraction of r_0. 0.2: ten
     /// times that of a furnished room, a seventh of that along a blank wall.
@@ -69,18 +68,12 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
     pub refinement_max_correction: f64,
-    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
-    pub max_correction: f64,
-    /// The largest rotation of a correction, degrees. 45.
-    pub max_correction_deg: f64,
     /// Largest angle between the direction of gravity that a scan tells and down in the map, degrees. 5: what an
     /// accelerometer says of a robot that brakes at 1 m/s2 is 6 off, at half of that 3.
     pub gravity_error_max_deg: f64,
     /// How many standard deviations of its covariance a pose may be from the guess. 4.7: of guesses as good as they say,
     /// one in a thousand is farther off (chi-squared with six degrees of freedom).
     pub covariance_deviations_max: f64,
-    /// When free space contradicts a pose.
-    pub free_space: FreeSpaceSettings,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
     pub lookup: Lookup,
@@ -123,9 +116,6 @@ pub struct MultiStartSettings {
     pub motion_above_deg: f64,
     /// Ascents of the guesses that look best, at most. 8; 0 believes every end.
     pub ascents: usize,
-    /// Two results are equally good where the fitness of the worse is at least this fraction of that of the better.
-    /// 0.95.
-    pub ambiguous_fitness: f64,
 }
 
 impl Default for AlignmentSettings {
@@ -143,16 +133,13 @@ impl Default for AlignmentSettings {
             sub_voxel_halvings: 4,
             refinement: RefinementSettings::default(),
             multi_start: MultiStartSettings::default(),
-            overlap_min: 0.2,
+            overlap_min: 0.0,
             undetermined_std: 0.2,
             slide: 5.0,
             slide_overlap_max: 0.85,
             refinement_max_correction: 8.0,
-            max_correction: 48.0,
-            max_correction_deg: 45.0,
             gravity_error_max_deg: 5.0,
             covariance_deviations_max: 4.7,
-            free_space: FreeSpaceSettings::default(),
             lookup: Lookup::Bloom,
         }
     }
@@ -166,14 +153,7 @@ impl Default for RefinementSettings {
 
 impl Default for MultiStartSettings {
     fn default() -> Self {
-        Self {
-            fitness_below: 0.85,
-            std_above: 0.1,
-            motion_above: 12.0,
-            motion_above_deg: 30.0,
-            ascents: 8,
-            ambiguous_fitness: 0.95,
-        }
+        Self { fitness_below: 0.85, std_above: 0.1, motion_above: 12.0, motion_above_deg: 30.0, ascents: 8 }
     }
 }
 
@@ -216,8 +196,6 @@ impl AlignmentSettings {
             ("slide", self.slide),
             ("slide_overlap_max", self.slide_overlap_max),
             ("refinement_max_correction", self.refinement_max_correction),
-            ("max_correction", self.max_correction),
-            ("max_correction_deg", self.max_correction_deg),
             ("gravity_error_max_deg", self.gravity_error_max_deg),
             ("covariance_deviations_max", self.covariance_deviations_max),
             ("multi_start.std_above", self.multi_start.std_above),
@@ -231,10 +209,6 @@ impl AlignmentSettings {
         let fractions = [
             ("overlap_min", self.overlap_min),
             ("multi_start.fitness_below", self.multi_start.fitness_below),
-            ("multi_start.ambiguous_fitness", self.multi_start.ambiguous_fitness),
-            ("free_space.blocked_max", self.free_space.blocked_max),
-            ("free_space.seen_through_max", self.free_space.seen_through_max),
-            ("free_space.explained_min", self.free_space.explained_min),
         ];
         match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
             Some(&(name, value)) => Err(AlignmentSettingsError::NotAFraction(name, value)),

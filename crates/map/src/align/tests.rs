@@ -14,7 +14,7 @@ fn corner(count: usize) -> Vec<Point> {
     let place = |i: usize| ((i * 7919 % 3001) as f32 * 1e-3, (i * 104_729 % 2999) as f32 * 1e-3);
     let point = |i: usize| {
         let (a, b) = place(i / 3);
-        Point::from([[2.0, a - 1.0, b], [a - 1.0, 2.0, b], [a - 1.0, b - 1.0, 0.0]][i % 3])
+        Point::from([[2.0, a - 1.0, b], [a - 1.0, 2.0, b], [a - 1.0, b - 1.0, -0.5]][i % 3])
     };
     (0..count).map(point).collect()
 }

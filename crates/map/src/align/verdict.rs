@@ -1,6 +1,6 @@
 //! Verdicts: whether to believe an alignment, and why not.
 
-use super::free_space::Contradiction;
+use super::agreement::{RayAgreement, Rival};
 use super::information::{Direction, PoseInformation};
 use super::prior::PosePrior;
 use super::refine::SurfaceFit;
@@ -66,9 +66,13 @@ pub struct Alignment {
     /// Distance that the refinement moved the end of the ascent, meters; rotations count by the scan's root mean square
     /// range.
     pub refined_by_m: f64,
-    /// What free space says against the pose; nothing where it was not asked, because the pose is not believed anyway or
-    /// the caller knows it.
-    pub contradiction: Contradiction,
+    /// How rays agree there; none where the caller knows the pose.
+    pub agreement: Option<RayAgreement>,
+    /// Poses that the scan may have been taken at as well: why it is [ambiguous](Verdict::Ambiguous).
+    pub rivals: Vec<Rival>,
+    /// Rays contradict the pose both ways, more than earlier scans contradict each other, and no other pose is better: things were
+    /// moved since, and the scan carves nothing.
+    pub contradicted_both_ways: bool,
     /// Other poses should have been looked for, and were not: [`MultiStartSettings::ascents`](super::MultiStartSettings) is 0.
     pub wants_more_starts: bool,
     /// Number of steps that moved the pose, over all stages.
@@ -82,6 +86,12 @@ impl Alignment {
     /// Fraction of all points in occupied voxels of level 0.
     pub fn overlap(&self) -> f64 {
         self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+
+    /// True of a pose that the caller tells, or that rays do not contradict both ways: what a scan saw through from there is
+    /// believed.
+    pub fn is_beyond_doubt(&self) -> bool {
+        !self.contradicted_both_ways
     }
 
     /// True where other poses should be looked for: off the surfaces, far from where the refinement went, weakly held,
@@ -99,27 +109,6 @@ impl Alignment {
             || self.information.directions()[0].std_m > multi_start.std_above * resolution_m
             || meters > multi_start.motion_above * resolution_m
             || degrees > multi_start.motion_above_deg
-    }
-
-    /// Changes the verdict from accepted to ambiguous where the pose lies farther from the guess than other poses were
-    /// looked for.
-    pub(super) fn within_max_correction(
-        self,
-        guess: &Pose,
-        map: &MultiResolutionMap,
-        settings: &AlignmentSettings,
-    ) -> Self {
-        let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
-        let (max_correction_m, max_correction_deg) =
-            (settings.max_correction * map.lattice().resolution_m(0), settings.max_correction_deg);
-        if self.verdict != Verdict::Accepted || meters <= max_correction_m && degrees <= max_correction_deg {
-            return self;
-        }
-        let reason = format!(
-            "it is {meters:.2} m and {degrees:.1} deg from the guess, within {max_correction_m:.2} m and {max_correction_deg} deg \
-             others were looked for"
-        );
-        self.but(Verdict::Ambiguous, reason)
     }
 
     /// Changes the verdict from accepted where the pose contradicts what was known of it beforehand.
@@ -207,7 +196,9 @@ impl Fit {
             information,
             undetermined,
             refined_by_m: self.refined_by_m,
-            contradiction: Contradiction::default(),
+            agreement: None,
+            rivals: Vec::new(),
+            contradicted_both_ways: false,
             wants_more_starts: false,
             iterations: self.iterations,
             lookups: self.lookups,
@@ -228,7 +219,9 @@ impl Alignment {
             information: PoseInformation::none(points),
             undetermined: Vec::new(),
             refined_by_m: 0.0,
-            contradiction: Contradiction::default(),
+            agreement: None,
+            rivals: Vec::new(),
+            contradicted_both_ways: false,
             wants_more_starts: false,
             iterations: 0,
             lookups: 0,

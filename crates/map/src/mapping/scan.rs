@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use super::guess::Guess;
 use super::ray_ends::RayEnds;
+use crate::align::PoseCovariance;
 use crate::align::localize::Gravity;
-use crate::align::{PoseCovariance, PosePrior};
-use crate::geometry::{Point, Pose, Twist};
+use crate::geometry::{Point, Twist};
 use crate::map::{RobotName, SessionName};
 
 /// A scan to map.
@@ -67,11 +67,6 @@ impl<'a> Scan<'a> {
             .map(|ends| ends.moved_m(velocity))
             .into_iter()
             .fold(0.0, f64::max)
-    }
-
-    /// What is known of its pose, where it is thought to have been taken at `guess` (map_from_sensor).
-    pub(super) fn prior(&self, guess: Pose) -> PosePrior {
-        PosePrior { guess, covariance: self.guess_covariance, gravity: self.gravity }
     }
 
     /// A scan without number and time, thought to have been taken at the robot's last pose.

@@ -7,6 +7,7 @@ use super::carving::{Carving, CarvingScan, CarvingSettings};
 use super::deskew::DeskewSettings;
 use super::error::MappingError;
 use super::located_scan::LocatedScan;
+use super::odometry::OdometrySettings;
 use super::recovery_settings::Recovery;
 use super::resolved_guess::last_seen;
 use super::scan::Scan;
@@ -14,9 +15,12 @@ use super::sightings::Sightings;
 use super::stationary::StationarySettings;
 use super::viewpoints::{SeenScan, ViewpointSettings};
 use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
-use crate::geometry::{Point, Pose, Twist};
+use crate::geometry::{Point, Pose, Twist, pose_difference};
 use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 use crate::util::StopSignal;
+
+/// A scan that was found farther from its guess than this leaves a viewpoint, meters: the next ones come from there.
+const FAR_M: f64 = 1.0;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
@@ -54,6 +58,8 @@ pub struct MappingSettings {
     pub alignment: AlignmentSettings,
     /// When a scan shows nothing new because its robot stands still; none: every scan that fits is inserted.
     pub stationary: Option<StationarySettings>,
+    /// How far off guesses may be of which nobody says.
+    pub odometry: OdometrySettings,
     /// When a motion is believed that scans are deskewed with.
     pub deskew: DeskewSettings,
     /// When a scan leaves a viewpoint.
@@ -83,6 +89,12 @@ impl<'a> ScanMapper<'a> {
         Self { settings: MappingSettings { carving, ..self.settings }, ..self }
     }
 
+    /// This mapper, for scans of a robot whose odometry errs so.
+    #[must_use]
+    pub fn with_odometry(self, odometry: OdometrySettings) -> Self {
+        Self { settings: MappingSettings { odometry, ..self.settings }, ..self }
+    }
+
     /// Finds where a scan was taken; changes nothing.
     ///
     /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other
@@ -100,7 +112,7 @@ impl<'a> ScanMapper<'a> {
             scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
         let mut velocity = self.velocity(scan, &guess);
         let mut alignment = if map_is_empty {
-            let upright = if scan.at_guess { guess } else { scan.prior(guess).leveled_guess() };
+            let upright = if scan.at_guess { guess } else { self.prior(scan, guess).leveled_guess() };
             Alignment::trusted(upright, map.settings().levels, scan.points)
         } else {
             self.align(scan, velocity.as_ref(), &guess, stop)
@@ -133,7 +145,7 @@ impl<'a> ScanMapper<'a> {
         let (points, settings) = (scan.points_at(velocity), &self.settings.alignment);
         match scan.at_guess {
             true => evaluate_at_until(self.map, &points, guess, settings, stop).accepted_by_caller(),
-            false => align_until(self.map, &points, &scan.prior(*guess), settings, stop),
+            false => align_until(self.map, &points, &self.prior(scan, *guess), settings, stop),
         }
     }
 
@@ -185,7 +197,9 @@ impl<'a> ScanMapper<'a> {
             ends.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
         }
         let (map_from_sensor, moved_m) = (&alignment.map_from_sensor, scan.moved_m(velocity));
-        let seen = SeenScan { points: &ends, map_from_sensor, moved_m };
+        let from_guess_m = pose_difference(&located.guess, map_from_sensor).0;
+        let is_needed = located.is_first || from_guess_m > FAR_M;
+        let seen = SeenScan { points: &ends, map_from_sensor, moved_m, is_needed };
         record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
@@ -205,8 +219,8 @@ impl<'a> ScanMapper<'a> {
         met
     }
 
-    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, or the
-    /// scan does not fit.
+    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, the
+    /// scan does not fit, or its pose is not [beyond doubt](Alignment::is_beyond_doubt): what is real must not go.
     ///
     /// They are those of the map's revision that the answer names: whoever inserts the scan later
     /// [cuts](Carving::cut) them to what is still there.
@@ -220,7 +234,9 @@ impl<'a> ScanMapper<'a> {
         record: &ScanRecord,
         stop: StopSignal<'_>,
     ) -> Result<Carving, MappingError> {
-        let Some(settings) = self.settings.carving.filter(|_| located.is_accepted()) else {
+        let Some(settings) =
+            self.settings.carving.filter(|_| located.is_accepted() && located.alignment.is_beyond_doubt())
+        else {
             return Ok(Carving::default());
         };
         let points = self.met(scan, record, located.velocity.as_ref());

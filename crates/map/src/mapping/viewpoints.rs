@@ -64,6 +64,8 @@ pub(super) struct SeenScan<'a> {
     pub(super) map_from_sensor: &'a Pose,
     /// How far the sensor was from there, at most, when a ray was taken, meters.
     pub(super) moved_m: f64,
+    /// It was found far from its guess, or is the map's first: the scans after it are judged by what it saw.
+    pub(super) is_needed: bool,
 }
 
 impl ViewpointSettings {
@@ -78,10 +80,14 @@ impl ViewpointSettings {
         if self.bytes_max == 0 {
             return None;
         }
-        let SeenScan { points, map_from_sensor, moved_m } = scan;
+        let SeenScan { points, map_from_sensor, moved_m, is_needed } = scan;
         let sweep = Sweep { range_max_m: self.range_max_m, moved_m: moved_m as f32 };
         let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
-        let least = if is_known_pose { self.unknown_from_known_pose } else { self.unknown_from_new_pose };
+        let least = match is_known_pose {
+            true => self.unknown_from_known_pose,
+            false if is_needed => 0.0,
+            false => self.unknown_from_new_pose,
+        };
         // The image takes a while to make: most scans end here.
         if unknown_to(viewpoints, map_from_sensor, sweep, spread(points)) < least {
             return None;
@@ -209,7 +215,7 @@ mod tests {
     }
 
     fn standing<'a>(points: &'a [Point], map_from_sensor: &'a Pose) -> SeenScan<'a> {
-        SeenScan { points, map_from_sensor, moved_m: 0.0 }
+        SeenScan { points, map_from_sensor, moved_m: 0.0, is_needed: false }
     }
 
     /// Drives through the room and back; the viewpoints, and how many there were after each scan.

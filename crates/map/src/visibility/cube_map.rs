@@ -84,6 +84,14 @@ impl CubeMap {
         (tile, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
     }
 
+    /// The pixels of the tile of a number, see [`CubeMap::place`].
+    pub(super) fn pixels_of_tile(self, tile: usize) -> impl Iterator<Item = Pixel> {
+        let (face, row, column) =
+            (tile / self.tiles / self.tiles, tile / self.tiles % self.tiles, tile % self.tiles);
+        let at = move |i: usize| [column * TILE_SIDE + i % TILE_SIDE, row * TILE_SIDE + i / TILE_SIDE];
+        (0..TILE_SIDE * TILE_SIDE).map(move |i| (face, at(i)))
+    }
+
     /// The pixels of all faces.
     pub(super) fn all_pixels(self) -> impl Iterator<Item = Pixel> {
         let side = self.pixels();

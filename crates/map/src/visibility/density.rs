@@ -25,6 +25,11 @@ pub(super) struct PointDensity {
 impl PointDensity {
     /// The density of points at `offsets` from the sensor; none where none has a direction.
     pub(super) fn of(offsets: &[[f32; 3]]) -> Option<Self> {
+        Self::no_finer_than(TILES[0], offsets)
+    }
+
+    /// The same, where pixels are of no use that are finer than those of so many tiles along a face.
+    pub(super) fn no_finer_than(finest: usize, offsets: &[[f32; 3]]) -> Option<Self> {
         let at_first = SeenPixels::of(CubeMap::new(TILES_AT_FIRST), offsets);
         if at_first.count == 0 {
             return None;
@@ -32,7 +37,7 @@ impl PointDensity {
         let points_a_pixel = offsets.len() as f64 / at_first.count as f64;
         let tiles_max = (TILES_AT_FIRST as f64 * points_a_pixel.sqrt()) as usize;
         let coarsest = TILES[TILES.len() - 1];
-        let candidates = TILES.iter().filter(|&&tiles| tiles <= tiles_max.max(coarsest));
+        let candidates = TILES.iter().filter(|&&tiles| tiles <= tiles_max.min(finest).max(coarsest));
         let mut seen = candidates.map(|&tiles| SeenPixels::of(CubeMap::new(tiles), offsets));
         seen.find_map(|seen| {
             let Gaps { of_one, wider } = seen.gaps();

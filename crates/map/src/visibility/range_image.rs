@@ -238,12 +238,22 @@ impl RangeImage {
         sight(self.map, |(face, pixel)| self.depth_m(face, pixel), offset, tolerance_m + self.rays.moved_m)
     }
 
-    /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw.
-    pub fn met(&self, wish: usize) -> Vec<Met> {
-        let kept = self.tiles.iter().map(Tile::seen_pixels).sum::<usize>();
-        let stride = kept.div_ceil(wish.max(1)).max(1);
-        let seen = self.map.all_pixels().filter(|&(face, pixel)| self.depth_m(face, pixel).is_some());
-        seen.step_by(stride).filter_map(|pixel| self.met_at(pixel)).collect()
+    /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw, and none of which is off by more than
+    /// `error_max_m`: at the rims of things a pixel does not tell where in it they lie.
+    pub fn met(&self, wish: usize, error_max_m: f32) -> Vec<Met> {
+        let met: Vec<Met> = self
+            .kept_pixels()
+            .filter_map(|pixel| self.met_at(pixel))
+            .filter(|met| met.error_m <= error_max_m)
+            .collect();
+        let stride = met.len().div_ceil(wish.max(1)).max(1);
+        met.into_iter().step_by(stride).collect()
+    }
+
+    /// The pixels of the tiles that are kept, seen or not.
+    fn kept_pixels(&self) -> impl Iterator<Item = Pixel> {
+        let kept = self.places.iter().enumerate().filter(|(_, place)| **place != NOT_SEEN);
+        kept.flat_map(|(tile, _)| self.map.pixels_of_tile(tile))
     }
 
     /// What was met in a pixel. Its depth is that of the nearest point in it: how far off that is from the middle of the pixel is told

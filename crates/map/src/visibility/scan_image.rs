@@ -1,11 +1,14 @@
 //! The image of a scan that is being aligned: the nearest point in each direction, made in one pass.
 
 use super::cube_map::{CubeMap, FACES, Projection};
+use super::density::PointDensity;
 use super::sight::{Sight, sight};
 use crate::geometry::Point;
 
-/// Tiles along the side of a face: pixels of 0.5 to 1 degree.
-const TILES: usize = 14;
+/// Tiles along the side of a face, at most: pixels of 0.5 to 1 degree.
+const TILES: usize = 13;
+/// Points that tell how fine they can be.
+const POINTS_OF_DENSITY: usize = 1 << 15;
 
 /// The depth of the nearest point of a scan in each pixel of a cube around its sensor.
 ///
@@ -20,8 +23,14 @@ pub struct ScanImage {
 
 impl ScanImage {
     /// The image of a scan of `points` (sensor frame, meters).
+    ///
+    /// Its pixels are as fine as the points lie: between rings that meet a floor at a small angle, finer ones would see it farther away
+    /// than it is.
     pub fn of(points: &[Point]) -> Self {
-        let map = CubeMap::new(TILES);
+        let some = points.iter().step_by(points.len().div_ceil(POINTS_OF_DENSITY).max(1));
+        let offsets: Vec<[f32; 3]> = some.map(|point| point.xyz()).collect();
+        let density = PointDensity::no_finer_than(TILES, &offsets);
+        let map = density.map_or(CubeMap::new(TILES), |density| density.map);
         let mut image = Self { map, depths_m: vec![f32::INFINITY; FACES * map.pixels() * map.pixels()] };
         for point in points {
             let Some(Projection { face, pixel, depth_m }) = map.project(point.xyz()) else { continue };
@@ -60,9 +69,9 @@ mod tests {
         let told = |x: f32| image.sight([x, 0.3 * x, -0.2 * x], 0.1);
         assert_eq!([told(4.0), told(4.09), told(3.91)], [Sight::Agrees; 3]);
         assert_eq!(told(3.5), Sight::Contradicts);
-        assert_eq!(told(4.5), Sight::Silent);
-        assert_eq!(image.sight([-3.0, 0.0, 0.0], 0.1), Sight::Silent, "nobody looked behind");
-        assert_eq!(image.sight([0.0; 3], 0.1), Sight::Silent);
+        assert_eq!(told(4.5), Sight::Hidden);
+        assert_eq!(image.sight([-3.0, 0.0, 0.0], 0.1), Sight::NotSeen, "nobody looked behind");
+        assert_eq!(image.sight([0.0; 3], 0.1), Sight::NotSeen);
     }
 
     #[test]

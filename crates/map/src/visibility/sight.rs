@@ -9,8 +9,10 @@ pub enum Sight {
     Agrees,
     /// Everything that was met lies farther away: nothing was there.
     Contradicts,
-    /// Nobody looked there, or something before it was in the way.
-    Silent,
+    /// Something before it was in the way.
+    Hidden,
+    /// Nobody looked there.
+    NotSeen,
 }
 
 /// Pixels on each side of a point's own in which it is looked for: what was met lies up to a pixel beside where it is seen.
@@ -25,7 +27,7 @@ pub(super) fn sight(
     offset: [f32; 3],
     tolerance_m: f32,
 ) -> Sight {
-    let Some(Projection { face, pixel, depth_m: own_m }) = map.project(offset) else { return Sight::Silent };
+    let Some(Projection { face, pixel, depth_m: own_m }) = map.project(offset) else { return Sight::NotSeen };
     let mut nearest_m = f32::INFINITY;
     for up in -BESIDE..=BESIDE {
         for right in -BESIDE..=BESIDE {
@@ -39,5 +41,9 @@ pub(super) fn sight(
             nearest_m = nearest_m.min(seen_m - own_m);
         }
     }
-    if nearest_m.is_finite() && nearest_m > tolerance_m { Sight::Contradicts } else { Sight::Silent }
+    match nearest_m {
+        _ if nearest_m.is_infinite() => Sight::NotSeen,
+        _ if nearest_m > tolerance_m => Sight::Contradicts,
+        _ => Sight::Hidden,
+    }
 }

@@ -10,7 +10,7 @@ use super::version::MapVersion;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use mrol_map::align::localize::Gravity;
-use mrol_map::align::{Direction, Method, PoseCovariance, Verdict};
+use mrol_map::align::{Direction, Method, PoseCovariance, RayAgreement, Rival, Verdict};
 use mrol_map::geometry::Pose;
 use mrol_map::map::{RobotName, SessionName};
 use mrol_map::mapping::{Guess, Recovered};
@@ -132,6 +132,10 @@ pub struct ScanAnswer {
     pub information: Option<[[f64; 6]; 6]>,
     /// Directions of the pose that the map's surfaces leave open.
     pub undetermined: Vec<Direction>,
+    /// How rays agree there; none where the caller told the pose, and of an answer that is given again.
+    pub rays: Option<RayAgreement>,
+    /// Poses that it may have been taken at as well: why it is ambiguous.
+    pub rivals: Vec<Rival>,
     /// Steps of the alignment.
     pub iterations: u32,
     /// Time that it took.

@@ -61,6 +61,7 @@ impl HostedMap {
         budget.check_to_grow()?;
         let recovers = settings.recovers(request);
         let mapper = self.mapper(request.method, recovers, settings).carving(settings.carving(request));
+        let mapper = mapper.with_odometry(settings.of_robot(&request.robot).odometry);
         let mapper = if effort == Effort::Whole { mapper } else { mapper.from_one_start() };
         let located = self.locate(&scan, &mapper, stop)?;
         let takes_long = located.alignment.wants_more_starts || recovers && !located.is_accepted();
@@ -132,7 +133,9 @@ impl HostedMap {
     ) -> Result<ScanAnswer, ServiceError> {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = FilteredScan::of(request, settings)?;
-        let located = self.locate(&scan, &self.mapper(request.method, false, settings), stop)?;
+        let odometry = settings.of_robot(&request.robot).odometry;
+        let mapper = self.mapper(request.method, false, settings).with_odometry(odometry);
+        let located = self.locate(&scan, &mapper, stop)?;
         let foreground = request.foreground_level.map(|level| self.foreground(&scan, &located, level));
         Ok(ScanAnswer { foreground, ..self.answer(&scan, &located) })
     }
@@ -248,6 +251,8 @@ impl HostedMap {
             fitness: 0.0,
             information: None,
             undetermined: Vec::new(),
+            rays: None,
+            rivals: Vec::new(),
             iterations: pose.iterations,
             align_time: Duration::ZERO,
             points_skipped: pose.points_skipped,
@@ -274,6 +279,8 @@ impl HostedMap {
             fitness: alignment.fitness,
             information: Some(alignment.information.rows()),
             undetermined: alignment.undetermined.clone(),
+            rays: alignment.agreement,
+            rivals: alignment.rivals.clone(),
             iterations: alignment.iterations,
             align_time: located.align_time,
             points_skipped: scan.skipped(),

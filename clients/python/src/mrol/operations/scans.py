@@ -33,6 +33,46 @@ class OpenDirection:
     std_m: float
 
 
+@dataclass(frozen=True)
+class RayCounts:
+    """What rays of one side say of a pose."""
+
+    asked: int
+    """Points that were looked for."""
+    agree: int
+    """Those where the other side met something, too."""
+    contradicted: int
+    """Those through which the other side saw."""
+
+    @property
+    def share(self) -> float:
+        """The share of points that agree, of those of which anything is known."""
+        return self.agree / max(1, self.agree + self.contradicted)
+
+    @property
+    def evidence(self) -> float:
+        """The share of points that agree, of all."""
+        return self.agree / max(1, self.asked)
+
+
+@dataclass(frozen=True)
+class RayAgreement:
+    """How the rays of a scan at a pose and those of earlier scans agree."""
+
+    of_scan: RayCounts
+    """The scan's points, in what earlier scans saw."""
+    of_map: RayCounts
+    """What earlier scans met, in what the scan saw."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A pose that a scan may have been taken at as well."""
+
+    map_from_sensor: Pose
+    rays: RayAgreement
+
+
 @dataclass(frozen=True, eq=False)
 class ScanAnswer(Versioned):
     """What became of a scan. One that does not fit is an answer: `accepted` is False, and the map is untouched."""
@@ -57,6 +97,10 @@ class ScanAnswer(Versioned):
     """The inverse covariance of the pose, shape (6, 6): x y z in meters, then turns in radians. None in a replayed answer."""
     undetermined: tuple[OpenDirection, ...]
     """Directions that the map leaves open."""
+    rays: RayAgreement | None
+    """How rays agree at the pose. None where the caller told it, and in a replayed answer."""
+    rivals: tuple[Rival, ...]
+    """Poses that it may have been taken at as well: why it is ambiguous."""
     iterations: int
     """Steps that moved the pose."""
     align_ms: float
@@ -270,6 +314,8 @@ def answer_in(fields: Fields, shape: tuple[int, ...], robot: str, session: str, 
         fitness=fields.number("fitness"),
         information=fields.optional("information", lambda name: fields.numbers(name, (6, 6))),
         undetermined=tuple(_open_direction(of) for of in fields.objects("undetermined")),
+        rays=fields.optional("rays", lambda name: _rays(fields.object(name))),
+        rivals=tuple(Rival(pose_in(of, "map_from_sensor"), _rays(of.object("rays"))) for of in fields.objects("rivals")),
         iterations=fields.whole("iterations"),
         align_ms=fields.number("align_ms"),
         new_voxels=fields.whole("new_voxels"),
@@ -283,6 +329,15 @@ def answer_in(fields: Fields, shape: tuple[int, ...], robot: str, session: str, 
         session=session,
         scan_id=scan_id,
     )
+
+
+def _rays(fields: Fields) -> RayAgreement:
+    of_scan, of_map = (fields.object(side) for side in ("of_scan", "of_map"))
+    return RayAgreement(_counts(of_scan), _counts(of_map))
+
+
+def _counts(fields: Fields) -> RayCounts:
+    return RayCounts(fields.whole("asked"), fields.whole("agree"), fields.whole("contradicted"))
 
 
 def _open_direction(fields: Fields) -> OpenDirection:

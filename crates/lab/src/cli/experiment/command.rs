@@ -3,8 +3,7 @@
 use clap::Subcommand;
 
 use super::{
-    carving, convergence, deskewing, free_space, hostile_guesses, lookup, mapping, rounds, scaling,
-    simulation, verdicts,
+    carving, convergence, deskewing, free_space, lookup, mapping, rounds, scaling, simulation, verdicts,
 };
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
@@ -23,7 +22,7 @@ EXAMPLES:
                                                what is known to be free, beside OctoMap
   mrol-lab experiment rounds                       what a map keeps of a robot that drives the same way for an hour
   mrol-lab experiment carving                      what a map loses of what is taken away, and keeps of what stands
-  mrol-lab experiment hostile-guesses hall/:0.1:hall office/:0.04:office
+  mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
   mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
                                                wrong poses accepted and right ones refused; simulated places too
@@ -44,7 +43,6 @@ enum Which {
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
     FreeSpace(free_space::FreeSpace),
-    HostileGuesses(hostile_guesses::HostileGuesses),
     Lookup(lookup::Lookup),
     Mapping(mapping::Mapping),
     Rounds(rounds::Rounds),
@@ -60,7 +58,6 @@ impl Experiment {
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),
             Which::FreeSpace(free_space) => free_space.run(&output),
-            Which::HostileGuesses(hostile) => hostile.run(&output),
             Which::Lookup(lookup) => lookup.run(&output),
             Which::Mapping(mapping) => mapping.run(&output),
             Which::Rounds(rounds) => rounds.run(&output),

@@ -5,7 +5,6 @@ mod command;
 mod convergence;
 mod deskewing;
 mod free_space;
-mod hostile_guesses;
 mod lookup;
 mod mapping;
 mod rounds;

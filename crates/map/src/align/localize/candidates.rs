@@ -6,8 +6,12 @@ use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
 use super::settings::LocalizationSettings;
 use super::visibility::blocked_share;
-use crate::align::sequential::{align_until, evaluate_at};
+use crate::align::agreement::Rays;
+use crate::align::rivals::Contest;
+use crate::align::sampled_scan::SampledScan;
+use crate::align::sequential::evaluate_at;
 use crate::align::settings::AlignmentSettings;
+use crate::align::stages::{climb, finish};
 use crate::align::verdict::Alignment;
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
@@ -47,9 +51,7 @@ impl Refinement<'_> {
             *candidate = refined;
         }
         rank(&mut candidates);
-        let mut candidates = self.distinct(candidates);
-        set_margins(&mut candidates);
-        candidates
+        self.distinct(candidates)
     }
 
     /// The candidate that a place leads to, refined with the thinned points; the unrefined place once stopped.
@@ -78,9 +80,25 @@ impl Refinement<'_> {
 
     /// Aligns `points` from a place. There is no restart from other guesses: the search has covered them.
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
-        let mut alignment = *self.alignment;
-        alignment.multi_start.ascents = 0;
-        align_until(self.map, points, &(*guess).into(), &alignment, self.stop)
+        let scan = SampledScan::new(points, self.map.lattice().extent_m(), self.alignment, self.stop);
+        let ascent = climb(self.map, &scan, *guess, self.map.settings().levels - 1, self.alignment);
+        finish(self.map, &scan, ascent, self.alignment)
+    }
+
+    /// Puts the candidate first that rays contradict least, with the verdict on it.
+    pub(super) fn ask_rays(&self, candidates: &mut [Candidate]) {
+        if candidates.is_empty() {
+            return;
+        }
+        let scan = SampledScan::new(self.points, self.map.lattice().extent_m(), self.alignment, self.stop);
+        let rays = Rays::of(self.map, &scan);
+        let contest = Contest { map: self.map, scan: &scan, rays: &rays, settings: self.alignment };
+        let places = candidates.iter().map(|candidate| candidate.alignment.clone()).collect();
+        let alignment = contest.decide_among(places);
+        let is_it = |candidate: &Candidate| candidate.map_from_sensor() == alignment.map_from_sensor;
+        let best = candidates.iter().position(is_it).unwrap_or(0);
+        candidates[best].alignment = alignment;
+        candidates[..=best].rotate_right(1);
     }
 
     /// Removes candidates that are the same place as a better one, which takes over their search score.
@@ -107,7 +125,7 @@ fn rank(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.fit().total_cmp(&a.fit()));
 }
 
-fn set_margins(ranked: &mut [Candidate]) {
+pub(super) fn set_margins(ranked: &mut [Candidate]) {
     let fits: Vec<f64> = ranked.iter().map(Candidate::fit).collect();
     for (place, candidate) in ranked.iter_mut().enumerate() {
         let other = if place == 0 { fits.get(1) } else { fits.first() };

@@ -3,7 +3,7 @@
 use super::answer::{Localization, LocalizationError};
 use super::basins::Basins;
 use super::bound::Bounds;
-use super::candidates::Refinement;
+use super::candidates::{Refinement, set_margins};
 use super::dilated::DilatedLevels;
 use super::orientation::Orientations;
 use super::query::LocalizationQuery;
@@ -106,9 +106,11 @@ fn search_and_refine(
     let refinement = Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, stop };
     let mut candidates = refinement.candidates(&found.places, query.candidates);
 
-    // 6) Say whether the best of them stands out.
+    // 6) Say which of them rays believe, and whether it stands out.
+    refinement.ask_rays(&mut candidates);
+    set_margins(&mut candidates);
     let cut_short = !found.complete || stop.is_stopped();
-    let (verdict, reason) = verdict_on(&candidates, cut_short, settings);
+    let (verdict, reason) = verdict_on(candidates.first(), cut_short, settings);
     candidates.truncate(query.candidates);
     Ok(Localization {
         verdict,

@@ -27,14 +27,6 @@ pub struct LocalizationSettings {
     pub basin_deg: f64,
     /// Number of best places that the search keeps. 16.
     pub basins_max: usize,
-    /// Fraction of a scan's points that must fall in occupied voxels for a place to be accepted. 0.45: more than an
-    /// alignment asks, which knows where to look.
-    pub overlap_min: f64,
-    /// Share of a scan's rays that may pass through what the map holds for a place to be accepted. 0.4:
-    /// rays that graze edges count, in a building with many doors up to a quarter of them.
-    pub blocked_max: f64,
-    /// Two candidates are ambiguous where the overlap of the second is at least this share of that of the best. 0.95.
-    pub ambiguous_share: f64,
     /// Most bytes of the dilated levels of one search. 512 MiB.
     pub grid_bytes_max: usize,
     /// Most cells that may wait to be divided; beyond it the least promising are dropped, and the search is not
@@ -56,9 +48,6 @@ impl Default for LocalizationSettings {
             basin_voxels: 5.0,
             basin_deg: 10.0,
             basins_max: 16,
-            overlap_min: 0.45,
-            blocked_max: 0.4,
-            ambiguous_share: 0.95,
             grid_bytes_max: 512 << 20,
             cells_waiting_max: 4_000_000,
         }

@@ -1,9 +1,17 @@
 //! The motion between two scans, by aligning one to the other.
 
-use crate::align::{AlignmentSettings, FreeSpaceSettings, Verdict, align_until};
+use crate::align::{AlignmentSettings, PoseCovariance, PosePrior, Verdict, align_until};
 use crate::geometry::{Point, Pose};
-use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, ViewpointRecord};
 use crate::util::StopSignal;
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
+
+/// How far a robot moves between two scans, and turns: one standard deviation. What was found is only a guess, which the map has to
+/// confirm.
+const MOVED_M: f64 = 0.5;
+const MOVED_DEG: f64 = 9.0;
+/// What is further away is seen up to here, meters.
+const RANGE_MAX_M: f32 = 60.0;
 
 /// Where the sensor was at the scan `now` in the frame of the sensor at the scan `before`: before_from_now. None where the
 /// one does not align to the other.
@@ -20,10 +28,13 @@ pub(super) fn motion_between(
     let map = MultiResolutionMap::new(*settings).ok()?;
     let robot = RobotName::new("before").ok()?;
     let taken_at = MappedScan::new(robot, Pose::identity());
-    map.committer().insert_scan(ScanRecord::of_points(taken_at, before, map.lattice()));
-    // One scan says little of free space, and what moved meanwhile is in both.
-    let free_space = FreeSpaceSettings { rays: 0, ..alignment.free_space };
-    let alignment = &AlignmentSettings { free_space, ..*alignment };
-    let found = align_until(&map, now, &Pose::identity().into(), alignment, stop);
+    let image =
+        RangeImage::of_points(before, Sweep { range_max_m: RANGE_MAX_M, moved_m: 0.0 }, IMAGE_BYTES_MAX);
+    let viewpoint = image.map(|image| ViewpointRecord { image, displaced: Vec::new() });
+    let record = ScanRecord::of_points(taken_at, before, map.lattice());
+    map.committer().insert_scan(ScanRecord { viewpoint, ..record });
+    let expected = Some(PoseCovariance::isotropic(MOVED_M, MOVED_DEG.to_radians()));
+    let prior = PosePrior { expected, ..Pose::identity().into() };
+    let found = align_until(&map, now, &prior, alignment, stop);
     (found.verdict == Verdict::Accepted && !stop.is_stopped()).then_some(found.map_from_sensor)
 }

@@ -52,10 +52,7 @@ impl<'a> ScanMapper<'a> {
         let settings = &recovery.settings;
         let kept =
             volumetric_sample_until(&points, settings.points_kept, self.settings.alignment.seed, stop).points;
-        let since = LostSince {
-            session: scan.session.clone(),
-            stored: self.map.trajectory().last_of(scan.robot).map(|last| last.revision),
-        };
+        let since = self.lost_since(scan);
         let before = recovery.lost.get(scan.robot, &since);
         let motion = before.as_ref().and_then(|before| {
             motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
@@ -94,8 +91,7 @@ impl<'a> ScanMapper<'a> {
         }
     }
 
-    /// Aligns the scan from where a search saw its robot, moved on since by `motion`: accepted where it is there, and fits
-    /// as well as a search asks.
+    /// Aligns the scan from where a search saw its robot, moved on since by `motion`: accepted where it is there.
     fn try_place(
         &self,
         scan: &Scan<'_>,
@@ -107,11 +103,32 @@ impl<'a> ScanMapper<'a> {
         let guess = before?.place? * motion?;
         let settings = &self.recovery?.settings;
         let alignment = self.align_again(points, &guess, scan.gravity, &self.settings.alignment, stop);
-        let fits = alignment.overlap() >= settings.localization.overlap_min;
-        let is_there = fits
-            && self.agrees(&alignment, &guess, settings)
-            && self.may_be_at(scan, &alignment.map_from_sensor);
+        let is_there =
+            self.agrees(&alignment, &guess, settings) && self.may_be_at(scan, &alignment.map_from_sensor);
         is_there.then_some((Recovered::Localization, alignment))
+    }
+
+    /// Aligns the scan where a search for it saw its robot.
+    pub(super) fn at_found_place(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> Option<(Recovered, Alignment)> {
+        let recovery = self.recovery?;
+        let lost = recovery.lost.get(scan.robot, &self.lost_since(scan))?;
+        let points = scan.points_at(located.velocity.as_ref());
+        let found = self.try_place(scan, Some(&lost), Some(&Pose::identity()), &points, stop)?;
+        recovery.lost.found(scan.robot);
+        Some(found)
+    }
+
+    /// Since when the robot of a refused scan is lost.
+    fn lost_since(&self, scan: &Scan<'_>) -> LostSince {
+        LostSince {
+            session: scan.session.clone(),
+            stored: self.map.trajectory().last_of(scan.robot).map(|last| last.revision),
+        }
     }
 
     /// Aligns the scan from other guesses than its own.
@@ -246,7 +263,11 @@ impl<'a> ScanMapper<'a> {
         let own =
             scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false);
         let is_ruled_out = own.is_ok_and(|guess| {
-            scan.prior(guess).rules_out(pose, self.map.settings().resolution_m, &self.settings.alignment)
+            self.prior(scan, guess).rules_out(
+                pose,
+                self.map.settings().resolution_m,
+                &self.settings.alignment,
+            )
         });
         is_in_reach && !is_ruled_out
     }

@@ -1,5 +1,7 @@
 //! The search for a lost robot.
 
+use std::time::Instant;
+
 use nalgebra::Vector3;
 
 use crate::align::Verdict;
@@ -9,8 +11,10 @@ use crate::align::localize::{
 };
 use crate::geometry::{Pose, translation_m};
 use crate::map::RobotName;
+use crate::mapping::error::MappingError;
 use crate::mapping::located_scan::LocatedScan;
 use crate::mapping::lost_robots::{LostRobots, SearchTask};
+use crate::mapping::recovery_settings::KINDS_OF_SEARCH;
 use crate::mapping::scan::Scan;
 use crate::mapping::scan_mapper::ScanMapper;
 use crate::util::StopSignal;
@@ -45,7 +49,7 @@ impl ScanMapper<'_> {
             self.map,
             &task.points,
             &task.query,
-            &recovery.settings.localization,
+            &recovery.settings.search(task.of_robot),
             &self.settings.alignment,
             supervision,
         );
@@ -53,13 +57,33 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// Searches for the robot of a refused scan at once, and for as long as it takes.
-    pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
-        let Some(task) = self.begin_search(scan.robot) else { return };
-        let alone =
-            &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
-        // An error is noted with the robot, and told with the scan.
-        drop(self.search(&task, alone));
+    /// Searches for the robot of a refused scan at once, and for as long as it takes; the scan where it was found, which is believed
+    /// at once: nobody else waits.
+    pub(in crate::mapping) fn search_at_once(
+        &self,
+        scan: &Scan<'_>,
+        located: LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> Result<LocatedScan, MappingError> {
+        let start = Instant::now();
+        for _ in 0..KINDS_OF_SEARCH {
+            let Some(task) = self.begin_search(scan.robot) else { break };
+            let alone =
+                &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
+            // An error is noted with the robot, and told with the scan.
+            drop(self.search(&task, alone));
+        }
+        let found = self.at_found_place(scan, &located, stop);
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        let align_time = located.align_time + start.elapsed();
+        Ok(match found {
+            Some((recovered, alignment)) => {
+                LocatedScan { alignment, align_time, recovered: Some(recovered), ..located }
+            }
+            None => LocatedScan { align_time, ..located },
+        })
     }
 
     /// A refused scan with what the last search for its robot said.
@@ -82,7 +106,7 @@ impl ScanMapper<'_> {
             return LocalizationQuery { candidates: CANDIDATES, ..LocalizationQuery::default() };
         };
         let (settings, search_box) = (recovery.settings, self.reachable(robot, timestamp_ns));
-        let gravity = (settings.keeps_tilt && number % 2 == 1).then(|| down_of(&last)).flatten();
+        let gravity = settings.keeps_tilt_in(number).then(|| down_of(&last)).flatten();
         LocalizationQuery { gravity, search_box, candidates: CANDIDATES, seed: number }
     }
 }

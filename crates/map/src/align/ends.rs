@@ -1,0 +1,221 @@
+//! Ends: where ascents ended, with what is known beforehand and what rays say for and against each.
+
+use nalgebra::Vector3;
+
+use super::agreement::{Look, RayAgreement, Rays, Witnesses};
+use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
+use super::settings::AlignmentSettings;
+use super::verdict::{Alignment, Verdict};
+use crate::geometry::{Pose, pose_difference};
+use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
+
+/// Poses that differ by less than this many r_0 and less than [`SAME_DEG`] are the same place.
+const SAME_VOXELS: f64 = 4.0;
+const SAME_DEG: f64 = 5.0;
+/// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see nothing of each other
+/// cannot be compared.
+const EVIDENCE_MIN: f64 = 0.2;
+const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
+/// Least share of points that agree, of those of which anything is known: of the better side near the guess, since people and what was
+/// moved contradict one side only; farther away, where some pose of many fits by chance, of both.
+const AGREEMENT_MIN: f64 = 0.9;
+/// A pose is near its guess within so many meters, half a standard deviation of a guess of which nothing else is known, and a tilt of one,
+/// degrees; other places are looked for up to so many meters, three of them. Its yaw does not count: the robot may have been turned
+/// unseen.
+const NEAR_M: f64 = 0.5 * WIDE_M;
+const NEAR_TILT_DEG: f64 = WIDE_DEG;
+const REACH_M: f64 = 3.0 * WIDE_M;
+/// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
+pub(super) const RIVAL: f64 = 9.0;
+
+/// True of poses at the same place in a map whose finest voxels have sides of `resolution_m`.
+pub(super) fn is_same_place(a: &Pose, b: &Pose, resolution_m: f64) -> bool {
+    let (meters, degrees) = pose_difference(a, b);
+    meters < SAME_VOXELS * resolution_m && degrees < SAME_DEG
+}
+
+/// The angle between what is up for two poses, degrees.
+fn tilt_deg(a: &Pose, b: &Pose) -> f64 {
+    (a.rotation * Vector3::z()).angle(&(b.rotation * Vector3::z())).to_degrees()
+}
+
+/// Where an ascent ended, with what speaks for and against it.
+#[derive(Debug)]
+pub(super) struct End {
+    pub(super) alignment: Alignment,
+    pub(super) agreement: RayAgreement,
+    look: Look,
+    /// How far it is from the guess, in standard deviations of what is known beforehand.
+    pub(super) deviations: f64,
+    /// Why it is not to be believed, whatever its rivals are.
+    pub(super) against: Option<(Verdict, String)>,
+}
+
+/// The ends of one scan's ascents, all looked at with the same witnesses.
+#[derive(Debug)]
+pub(super) struct Ends<'a> {
+    pub(super) all: Vec<End>,
+    /// Look-ups of all their ascents.
+    pub(super) lookups: u64,
+    rays: &'a Rays,
+    pub(super) witnesses: Witnesses,
+    /// What is known beforehand; none of places that a search found.
+    pub(super) prior: Option<PosePrior>,
+    resolution_m: f64,
+    overlap_min: f64,
+    stop: StopSignal<'a>,
+}
+
+impl<'a> Ends<'a> {
+    /// The ends of some ascents, which must not be none.
+    pub(super) fn of(
+        found: Vec<Alignment>,
+        map: &MultiResolutionMap,
+        rays: &'a Rays,
+        prior: Option<PosePrior>,
+        settings: &AlignmentSettings,
+        stop: StopSignal<'a>,
+    ) -> Self {
+        let poses: Vec<Pose> = found.iter().map(|end| end.map_from_sensor).collect();
+        let witnesses = rays.witnesses(map, &poses, stop);
+        let (resolution_m, overlap_min) = (map.lattice().resolution_m(0), settings.overlap_min);
+        let lookups = found.iter().map(|end| end.lookups).sum();
+        let mut ends =
+            Self { all: Vec::new(), lookups, rays, witnesses, prior, resolution_m, overlap_min, stop };
+        // Of those at one place the one that fits best.
+        let mut found = found;
+        let fit = |end: &Alignment| if map.settings().moments { end.fitness } else { end.overlap() };
+        found.sort_by(|a, b| fit(b).total_cmp(&fit(a)));
+        found.into_iter().for_each(|found| ends.push(found));
+        ends
+    }
+
+    /// Adds the end of another ascent, if it lies elsewhere.
+    pub(super) fn add(&mut self, found: Alignment) {
+        self.lookups += found.lookups;
+        if !self.stop.is_stopped() {
+            self.push(found);
+        }
+    }
+
+    fn push(&mut self, found: Alignment) {
+        let is_known = self.all.iter().any(|end| {
+            is_same_place(&end.alignment.map_from_sensor, &found.map_from_sensor, self.resolution_m)
+        });
+        if !is_known {
+            self.all.push(self.end(found));
+        }
+    }
+
+    /// Leaves open which way the robot was turned.
+    pub(super) fn open_yaw(&mut self) {
+        self.prior = self.prior.map(PosePrior::with_open_yaw);
+        for k in 0..self.all.len() {
+            self.all[k].deviations = self.deviations(&self.all[k].alignment.map_from_sensor);
+        }
+    }
+
+    fn end(&self, alignment: Alignment) -> End {
+        let pose = &alignment.map_from_sensor;
+        let (look, deviations) = (self.rays.look(pose, &self.witnesses, self.stop), self.deviations(pose));
+        let agreement = look.agreement();
+        let against = self.reason_against(&alignment, &agreement);
+        End { alignment, agreement, look, deviations, against }
+    }
+
+    /// How far a pose is from the guess, in standard deviations.
+    pub(super) fn deviations(&self, pose: &Pose) -> f64 {
+        self.prior.map_or(0.0, |prior| prior.deviations(pose, self.resolution_m))
+    }
+
+    /// Why a pose is not to be believed, whatever its rivals are.
+    fn reason_against(&self, found: &Alignment, agreement: &RayAgreement) -> Option<(Verdict, String)> {
+        let RayAgreement { of_scan, of_map } = agreement;
+        let (a, b) = (of_scan.evidence(), of_map.evidence());
+        if a.max(b) < EVIDENCE_MIN || a.min(b) < EVIDENCE_OF_BOTH_MIN {
+            let words = "of the scan's points and of what earlier scans met in its view agree";
+            let least =
+                format!("at least {EVIDENCE_MIN} of one and {EVIDENCE_OF_BOTH_MIN} of the other have to");
+            return Some((Verdict::LowOverlap, format!("{a:.3} and {b:.3} {words}, {least}")));
+        }
+        if let Some(worst) = found.undetermined.first() {
+            return Some((Verdict::Undetermined, format!("open along {worst}")));
+        }
+        let (overlap, overlap_min) = (found.overlap(), self.overlap_min);
+        if overlap < overlap_min {
+            let reason = format!("overlap {overlap:.3} is below overlap_min {overlap_min}");
+            return Some((Verdict::LowOverlap, reason));
+        }
+        let from_guess = self.prior.map(|prior| pose_difference(&prior.guess, &found.map_from_sensor).0);
+        if let Some(far_m) = from_guess.filter(|meters| *meters > REACH_M) {
+            let reason =
+                format!("it is {far_m:.2} m from the guess, others were looked for up to {REACH_M} m");
+            return Some((Verdict::Ambiguous, reason));
+        }
+        let tilt_deg = self.prior.map_or(0.0, |prior| tilt_deg(&prior.guess, &found.map_from_sensor));
+        let is_near = from_guess.is_some_and(|meters| meters <= NEAR_M) && tilt_deg <= NEAR_TILT_DEG;
+        let share = if is_near { agreement.better() } else { agreement.worse() };
+        (share < AGREEMENT_MIN).then(|| {
+            let (a, b) = (of_scan.contradicted_share(), of_map.contradicted_share());
+            let words = "of the scan's points and of what earlier scans met are contradicted";
+            let sides = if is_near { "of both" } else { "of one, so far from the guess," };
+            let most = 1.0 - AGREEMENT_MIN;
+            (Verdict::Contradicted, format!("{a:.3} and {b:.3} {words}: at most {most:.1} {sides} may be"))
+        })
+    }
+
+    /// The end that rays contradict least, of those that may be believed.
+    pub(super) fn preferred(&self) -> Option<&End> {
+        let fit = self.all.iter().filter(|end| end.against.is_none());
+        fit.reduce(|best, end| if end.is_contradicted_more_than(best) < 0.0 { end } else { best })
+    }
+
+    /// The end of least cost, of those that may be believed; where there are none, the one that fits best.
+    pub(super) fn best(&self) -> &End {
+        let cost = |end: &&End| self.preferred().map_or(0.0, |preferred| end.cost(preferred));
+        let fit = self.all.iter().filter(|end| end.against.is_none());
+        let by_fitness = |a: &&End, b: &&End| a.alignment.fitness.total_cmp(&b.alignment.fitness);
+        let best = fit.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        best.or_else(|| self.all.iter().max_by(by_fitness)).unwrap_or(&self.all[0])
+    }
+
+    /// What speaks as much for another place as for `best`: the ends elsewhere whose cost is little more, and those that rays clearly
+    /// prefer, since what is known beforehand may be too sure of itself.
+    pub(super) fn rivals_of(&self, best: &End) -> Vec<&End> {
+        let Some(preferred) = self.preferred() else { return Vec::new() };
+        let own = best.cost(preferred);
+        let is_rival = |end: &&End| {
+            end.cost(preferred) - own <= RIVAL || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
+        };
+        let is_elsewhere = |end: &&End| {
+            let (a, b) = (&end.alignment.map_from_sensor, &best.alignment.map_from_sensor);
+            !is_same_place(a, b, self.resolution_m)
+        };
+        self.all.iter().filter(|end| end.against.is_none()).filter(is_elsewhere).filter(is_rival).collect()
+    }
+
+    /// How rays agree at some other pose.
+    pub(super) fn agreement_at(&self, pose: &Pose) -> RayAgreement {
+        self.rays.look(pose, &self.witnesses, self.stop).agreement()
+    }
+
+    /// The share of what each witness met that another one contradicts.
+    pub(super) fn contradicted_among_witnesses(&self) -> f64 {
+        self.rays.contradicted_among(&self.witnesses)
+    }
+}
+
+impl End {
+    /// What is known beforehand and what rays say against this end, in squared standard deviations; rays against the end that they
+    /// prefer.
+    pub(super) fn cost(&self, preferred: &Self) -> f64 {
+        let z = self.is_contradicted_more_than(preferred).max(0.0);
+        self.deviations * self.deviations + z * z
+    }
+
+    /// How much more rays contradict this end than another, in standard deviations.
+    fn is_contradicted_more_than(&self, other: &Self) -> f64 {
+        self.look.contradicted_more_than(&other.look)
+    }
+}

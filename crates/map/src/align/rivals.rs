@@ -1,0 +1,190 @@
+//! Rivals: which of several poses a scan was taken at, by what is known beforehand and by rays.
+//!
+//! No least agreement tells a right pose from a wrong one: a robot that turned in a rectangular room has nearly as much as at the true
+//! pose. But the true pose is contradicted less. So the poses where ascents ended are compared, with the same witnesses, by one cost:
+//! the squared deviation from what is known beforehand, and that by which rays contradict a pose more than the one they like best.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
+
+use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
+use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
+use super::ends::{End, Ends, RIVAL};
+use super::prior::PosePrior;
+use super::sampled_scan::SampledScan;
+use super::settings::AlignmentSettings;
+use super::stages::{climb, finish};
+use super::verdict::{Alignment, Verdict};
+use crate::geometry::Pose;
+use crate::map::MultiResolutionMap;
+
+/// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the witnesses contradict
+/// each other.
+const CONTRADICTED_MIN: f64 = 0.005;
+const UNUSUAL: f64 = 2.0;
+/// How many times as much rays have to contradict a pose aside: so many r_0, or turned by so many degrees.
+const CONTRAST_MIN: f64 = 2.0;
+const ASIDE_VOXELS: f64 = 8.0;
+const ASIDE_DEG: f64 = 10.0;
+/// Other places are looked for where what is known beforehand reaches farther than this, r_0.
+const REACH_VOXELS: f64 = 4.0;
+
+/// A scan whose pose is to be told from its rivals.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contest<'a> {
+    pub(super) map: &'a MultiResolutionMap,
+    pub(super) scan: &'a SampledScan<'a>,
+    pub(super) rays: &'a Rays,
+    pub(super) settings: &'a AlignmentSettings,
+}
+
+impl Contest<'_> {
+    /// The best of `found`, which must not be empty, and of what fits as well elsewhere, with a verdict.
+    pub(super) fn decide(&self, found: Vec<Alignment>, prior: &PosePrior) -> Alignment {
+        let mut ends = self.ends(found, Some(*prior));
+        let best = ends.best();
+        let is_doubted = self.is_doubted(best, &ends);
+        if best.against.is_some() && !is_doubted {
+            return self.judged(&ends);
+        }
+        // Whoever was turned away unseen may stand at any yaw, and where things repeat the scan fits at each of them.
+        let may_have_turned = is_doubted || prior.leaves_yaw_open();
+        let others = self.others(&best.alignment, prior, may_have_turned);
+        if others.is_empty() || self.settings.multi_start.ascents == 0 {
+            return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&ends) };
+        }
+        if may_have_turned {
+            ends.open_yaw();
+        }
+        for (guess, coarsest) in others {
+            let ascent = climb(self.map, self.scan, guess, coarsest, self.settings);
+            ends.add(finish(self.map, self.scan, ascent, self.settings));
+        }
+        self.judged(&ends)
+    }
+
+    /// Which of some places that a search found is the best, with a verdict: nothing is known beforehand. `places` must not be empty.
+    pub(super) fn decide_among(&self, places: Vec<Alignment>) -> Alignment {
+        self.judged(&self.ends(places, None))
+    }
+
+    fn ends(&self, found: Vec<Alignment>, prior: Option<PosePrior>) -> Ends<'_> {
+        Ends::of(found, self.map, self.rays, prior, self.settings, self.scan.stop)
+    }
+
+    /// Where else the scan may fit as well, with the coarsest level to ascend on from there: shifted as far as the prior reaches around
+    /// its guess, along the map's axes and those of what holds the pose, and turned.
+    fn others(&self, found: &Alignment, prior: &PosePrior, may_have_turned: bool) -> Vec<(Pose, u32)> {
+        let far_m = REACH_VOXELS * self.map.lattice().resolution_m(0);
+        let from_guess = found.map_from_sensor.translation.vector - prior.guess.translation.vector;
+        let possible_m = |axis: Vector2<f64>| {
+            let possible_m = prior.possible_m(axis) + from_guess.xy().dot(&axis).abs();
+            if possible_m > far_m { possible_m } else { 0.0 }
+        };
+        let axes = [Some(Vector2::x()), least_held(found)];
+        let axes: Vec<_> = axes.into_iter().flatten().collect();
+        let pose = &found.map_from_sensor;
+        let shifted = shifted(self.map, self.scan, pose, &axes, possible_m, self.settings);
+        let turned = match may_have_turned {
+            true => turned(self.map, self.scan, pose, self.settings),
+            false => Vec::new(),
+        };
+        let coarsest = self.map.settings().levels - 1;
+        let shifted = shifted.into_iter().map(|guess| (guess, LEVEL_OF_SHIFTS.min(coarsest)));
+        shifted.chain(turned.into_iter().map(|guess| (guess, LEVEL_OF_TURNS.min(coarsest)))).collect()
+    }
+
+    /// True of an end that rays contradict both ways, by more than the witnesses contradict each other: people, and what was brought
+    /// or taken away, contradict one side only.
+    fn is_doubted(&self, end: &End, ends: &Ends<'_>) -> bool {
+        let RayAgreement { of_scan, of_map } = end.agreement;
+        let both = of_scan.contradicted_share().min(of_map.contradicted_share());
+        let is_contradicted = matches!(end.against, Some((Verdict::Contradicted, _)));
+        is_contradicted
+            || end.against.is_none()
+                && both > CONTRADICTED_MIN
+                && both > UNUSUAL * ends.contradicted_among_witnesses()
+    }
+
+    /// The verdict on the best of the ends.
+    fn judged(&self, ends: &Ends<'_>) -> Alignment {
+        let best = ends.best();
+        let alignment = Alignment {
+            agreement: Some(best.agreement),
+            contradicted_both_ways: self.is_doubted(best, ends),
+            lookups: ends.lookups,
+            ..best.alignment.clone()
+        };
+        if let Some((verdict, reason)) = best.against.clone() {
+            return alignment.but(verdict, reason);
+        }
+        let agree = told(&best.agreement);
+        let rivals = ends.rivals_of(best);
+        if let Some(rival) = rivals.first() {
+            let [x, y, z] = rival.alignment.map_from_sensor.translation.vector.into();
+            let count = rivals.len();
+            let reason = format!(
+                "{agree}; of {count} other poses the first, at {x:.2} {y:.2} {z:.2} m, is as likely: {}",
+                told(&rival.agreement)
+            );
+            let rival = |end: &&End| Rival {
+                map_from_sensor: end.alignment.map_from_sensor,
+                agreement: end.agreement,
+            };
+            let rivals = rivals.iter().map(rival).collect();
+            return Alignment { rivals, ..alignment }.but(Verdict::Ambiguous, reason);
+        }
+        if let Some(aside) = self.slides_to(best, ends) {
+            return alignment.but(Verdict::Undetermined, format!("{agree}, and as well {aside}"));
+        }
+        let (deviations, held_m) = (best.deviations, alignment.information.directions()[0].std_m);
+        let moments = if self.map.settings().moments { "" } else { "; the map keeps no moments" };
+        let reason = format!(
+            "{agree}, {deviations:.1} standard deviations from the guess, held to {held_m:.4} m in every direction{moments}"
+        );
+        alignment.but(Verdict::Accepted, reason)
+    }
+
+    /// Where rays contradict the scan hardly more than at `end`, a little aside or turned, as far as the prior allows: they do not hold
+    /// it.
+    fn slides_to(&self, end: &End, ends: &Ends<'_>) -> Option<String> {
+        let pose = &end.alignment.map_from_sensor;
+        let aside_m = ASIDE_VOXELS * self.map.lattice().resolution_m(0);
+        let axis = least_held(&end.alignment).unwrap_or_else(Vector2::x);
+        let across = Vector2::new(-axis.y, axis.x);
+        let shifts = [axis, -axis, across, -across].map(|way| (way * aside_m, 0.0));
+        let turns = [ASIDE_DEG, -ASIDE_DEG].map(|degrees| (Vector2::zeros(), degrees));
+        let is_open = |(shift, degrees): &(Vector2<f64>, f64)| {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * degrees.to_radians());
+            let shift = Translation3::new(shift.x, shift.y, 0.0);
+            let aside = Pose::from_parts(shift * pose.translation, turn * pose.rotation);
+            // Most are ruled out by what is known beforehand, without a look.
+            let farther = ends.deviations(&aside).powi(2) - end.deviations.powi(2);
+            farther <= RIVAL && contrast(&end.agreement, &ends.agreement_at(&aside)) < CONTRAST_MIN
+        };
+        let (shift, degrees) = shifts.into_iter().chain(turns).find(is_open)?;
+        Some(match degrees == 0.0 {
+            true => format!("{:.2} m along x and {:.2} m along y from there", shift.x, shift.y),
+            false => format!("turned by {degrees} deg"),
+        })
+    }
+}
+
+/// The direction on the floor along which the map's surfaces hold a pose least; none where turns are all that is open.
+fn least_held(found: &Alignment) -> Option<Vector2<f64>> {
+    let directions = found.information.directions().into_iter();
+    let on_floor = directions.map(|open| Vector2::new(open.direction[0], open.direction[1]));
+    on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())
+}
+
+/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one side wherever the
+/// scan is put. One point more or less is chance.
+fn contrast(here: &RayAgreement, there: &RayAgreement) -> f64 {
+    let of =
+        |here: RayCounts, there: RayCounts| (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64;
+    of(here.of_scan, there.of_scan).max(of(here.of_map, there.of_map))
+}
+
+/// Says how rays agree at a pose.
+fn told(RayAgreement { of_scan, of_map }: &RayAgreement) -> String {
+    format!("{:.3} of the scan's and {:.3} of the map's rays agree", of_scan.share(), of_map.share())
+}
