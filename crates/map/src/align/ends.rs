@@ -59,7 +59,7 @@ pub(super) struct Ends<'a> {
     /// Look-ups of all their ascents.
     pub(super) lookups: u64,
     rays: &'a Rays,
-    pub(super) witnesses: Witnesses,
+    witnesses: Witnesses,
     /// What is known beforehand; none of places that a search found.
     pub(super) prior: Option<PosePrior>,
     resolution_m: f64,

@@ -136,11 +136,14 @@ impl Contest<'_> {
         if let Some(aside) = self.slides_to(best, ends) {
             return alignment.but(Verdict::Undetermined, format!("{agree}, and as well {aside}"));
         }
-        let (deviations, held_m) = (best.deviations, alignment.information.directions()[0].std_m);
+        let held_m = alignment.information.directions()[0].std_m;
+        // A search has no guess.
+        let from_guess = match ends.prior {
+            Some(_) => format!(", {:.1} standard deviations from the guess", best.deviations),
+            None => String::new(),
+        };
         let moments = if self.map.settings().moments { "" } else { "; the map keeps no moments" };
-        let reason = format!(
-            "{agree}, {deviations:.1} standard deviations from the guess, held to {held_m:.4} m in every direction{moments}"
-        );
+        let reason = format!("{agree}{from_guess}, held to {held_m:.4} m in every direction{moments}");
         alignment.but(Verdict::Accepted, reason)
     }
 

@@ -14,16 +14,16 @@ use crate::map::MultiResolutionMap;
 pub enum Verdict {
     /// The scan fits the map.
     Accepted,
-    /// Too few of its points fall in occupied voxels.
+    /// The scan and earlier scans saw too little of each other.
     LowOverlap,
     /// The scan fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves
-    /// a direction open.
+    /// a direction open, or rays agree as well a little aside.
     Undetermined,
-    /// Several starts ended at different poses that fit about equally well, or the pose lies farther from the guess
-    /// than other poses were looked for.
+    /// The scan may have been taken at other poses as well ([`Alignment::rivals`]), or the pose lies farther from the guess than
+    /// other poses were looked for.
     Ambiguous,
-    /// The scan fits, but its rays pass through what the map holds, earlier scans saw through its points, or the pose is
-    /// not where gravity or the covariance of the guess allow.
+    /// The scan fits, but earlier scans saw through its points and it saw through what they met, or the pose is not where
+    /// gravity or the covariance of the guess allow.
     Contradicted,
 }
 
