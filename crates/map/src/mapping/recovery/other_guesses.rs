@@ -108,21 +108,6 @@ impl<'a> ScanMapper<'a> {
         is_there.then_some((Recovered::Localization, alignment))
     }
 
-    /// Aligns the scan where a search for it saw its robot.
-    pub(super) fn at_found_place(
-        &self,
-        scan: &Scan<'_>,
-        located: &LocatedScan,
-        stop: StopSignal<'_>,
-    ) -> Option<(Recovered, Alignment)> {
-        let recovery = self.recovery?;
-        let lost = recovery.lost.get(scan.robot, &self.lost_since(scan))?;
-        let points = scan.points_at(located.velocity.as_ref());
-        let found = self.try_place(scan, Some(&lost), Some(&Pose::identity()), &points, stop)?;
-        recovery.lost.found(scan.robot);
-        Some(found)
-    }
-
     /// Since when the robot of a refused scan is lost.
     fn lost_since(&self, scan: &Scan<'_>) -> LostSince {
         LostSince {

@@ -1,7 +1,5 @@
 //! The search for a lost robot.
 
-use std::time::Instant;
-
 use nalgebra::Vector3;
 
 use crate::align::Verdict;
@@ -11,7 +9,6 @@ use crate::align::localize::{
 };
 use crate::geometry::{Pose, translation_m};
 use crate::map::RobotName;
-use crate::mapping::error::MappingError;
 use crate::mapping::located_scan::LocatedScan;
 use crate::mapping::lost_robots::{LostRobots, SearchTask};
 use crate::mapping::recovery_settings::KINDS_OF_SEARCH;
@@ -57,33 +54,16 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// Searches for the robot of a refused scan at once, and for as long as it takes; the scan where it was found, which is believed
-    /// at once: nobody else waits.
-    pub(in crate::mapping) fn search_at_once(
-        &self,
-        scan: &Scan<'_>,
-        located: LocatedScan,
-        stop: StopSignal<'_>,
-    ) -> Result<LocatedScan, MappingError> {
-        let start = Instant::now();
+    /// Searches for the robot of a refused scan at once, and for as long as it takes. The next scan has to confirm what is found: a
+    /// camera before a blank wall is found at several walls, and not always doubted.
+    pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
         for _ in 0..KINDS_OF_SEARCH {
-            let Some(task) = self.begin_search(scan.robot) else { break };
+            let Some(task) = self.begin_search(scan.robot) else { return };
             let alone =
                 &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
             // An error is noted with the robot, and told with the scan.
             drop(self.search(&task, alone));
         }
-        let found = self.at_found_place(scan, &located, stop);
-        if stop.is_stopped() {
-            return Err(MappingError::Stopped);
-        }
-        let align_time = located.align_time + start.elapsed();
-        Ok(match found {
-            Some((recovered, alignment)) => {
-                LocatedScan { alignment, align_time, recovered: Some(recovered), ..located }
-            }
-            None => LocatedScan { align_time, ..located },
-        })
     }
 
     /// A refused scan with what the last search for its robot said.
