@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::agreement::{Look, RayAgreement, Rays, Witnesses};
+use super::agreement::{Look, RayAgreement, Rays, Rival, Witnesses};
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
 use super::verdict::{Alignment, Verdict};
@@ -180,19 +180,29 @@ impl<'a> Ends<'a> {
         best.or_else(|| self.all.iter().max_by(by_fitness)).unwrap_or(&self.all[0])
     }
 
-    /// What speaks as much for another place as for `best`: the ends elsewhere whose cost is little more, and those that rays clearly
-    /// prefer, since what is known beforehand may be too sure of itself.
-    pub(super) fn rivals_of(&self, best: &End) -> Vec<&End> {
+    /// What may as well be the truth as `best`: the ends elsewhere whose cost is little more, those that rays clearly prefer, since what
+    /// is known beforehand may be too sure of itself, and the guess itself, where rays do not contradict it.
+    ///
+    /// An end of which a direction is open is not believed, but it is possible. So is the guess, where the scan may show what nobody
+    /// saw so far; of all other places where that holds nothing is asked, since there are always some.
+    pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
         let own = best.cost(preferred);
-        let is_rival = |end: &&End| {
+        let is_elsewhere =
+            |pose: &Pose| !is_same_place(pose, &best.alignment.map_from_sensor, self.resolution_m);
+        let is_as_likely = |end: &&End| {
             end.cost(preferred) - own <= RIVAL || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
         };
-        let is_elsewhere = |end: &&End| {
-            let (a, b) = (&end.alignment.map_from_sensor, &best.alignment.map_from_sensor);
-            !is_same_place(a, b, self.resolution_m)
-        };
-        self.all.iter().filter(|end| end.against.is_none()).filter(is_elsewhere).filter(is_rival).collect()
+        let ends = self.all.iter().filter(|end| end.has_evidence());
+        let ends = ends.filter(|end| is_elsewhere(&end.alignment.map_from_sensor)).filter(is_as_likely);
+        let of_end =
+            |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
+        let guess = self.prior.map(|prior| prior.guess).filter(is_elsewhere);
+        let at_guess = guess.map(|guess| (guess, self.rays.look(&guess, &self.witnesses, self.stop)));
+        let at_guess = at_guess.filter(|(_, look)| cost(0.0, look, &preferred.look) - own <= RIVAL);
+        let of_guess =
+            |(map_from_sensor, look): (Pose, Look)| Rival { map_from_sensor, agreement: look.agreement() };
+        ends.map(of_end).chain(at_guess.map(of_guess)).collect()
     }
 
     /// How rays agree at some other pose.
@@ -210,12 +220,22 @@ impl End {
     /// What is known beforehand and what rays say against this end, in squared standard deviations; rays against the end that they
     /// prefer.
     pub(super) fn cost(&self, preferred: &Self) -> f64 {
-        let z = self.is_contradicted_more_than(preferred).max(0.0);
-        self.deviations * self.deviations + z * z
+        cost(self.deviations, &self.look, &preferred.look)
+    }
+
+    /// True where the scan and earlier scans saw enough of each other.
+    fn has_evidence(&self) -> bool {
+        !matches!(self.against, Some((Verdict::LowOverlap, _)))
     }
 
     /// How much more rays contradict this end than another, in standard deviations.
     fn is_contradicted_more_than(&self, other: &Self) -> f64 {
         self.look.contradicted_more_than(&other.look)
     }
+}
+
+/// [`End::cost`] of a pose that is so many standard deviations from the guess.
+fn cost(deviations: f64, look: &Look, preferred: &Look) -> f64 {
+    let z = look.contradicted_more_than(preferred).max(0.0);
+    deviations * deviations + z * z
 }

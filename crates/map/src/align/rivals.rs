@@ -6,7 +6,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
-use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
+use super::agreement::{RayAgreement, RayCounts, Rays};
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
 use super::ends::{End, Ends, RIVAL};
 use super::prior::PosePrior;
@@ -120,17 +120,12 @@ impl Contest<'_> {
         let agree = told(&best.agreement);
         let rivals = ends.rivals_of(best);
         if let Some(rival) = rivals.first() {
-            let [x, y, z] = rival.alignment.map_from_sensor.translation.vector.into();
+            let [x, y, z] = rival.map_from_sensor.translation.vector.into();
             let count = rivals.len();
             let reason = format!(
                 "{agree}; of {count} other poses the first, at {x:.2} {y:.2} {z:.2} m, is as likely: {}",
                 told(&rival.agreement)
             );
-            let rival = |end: &&End| Rival {
-                map_from_sensor: end.alignment.map_from_sensor,
-                agreement: end.agreement,
-            };
-            let rivals = rivals.iter().map(rival).collect();
             return Alignment { rivals, ..alignment }.but(Verdict::Ambiguous, reason);
         }
         if let Some(aside) = self.slides_to(best, ends) {
