@@ -4,38 +4,23 @@
 //! where something was met there, it is *contradicted* where all that was met lies behind it, and what nobody saw says nothing.
 //! So neither the density of a map nor the spacing of rays against its voxels plays a part, and new ground is no argument.
 
-use std::cmp::Reverse;
 use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::marched;
 use super::sampled_scan::SampledScan;
+use super::witnesses::{MetInMap, Witnesses};
 use crate::geometry::{Point, Pose};
-use crate::map::{Lookup, MultiResolutionMap};
+use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
-use crate::visibility::{Met, ScanImage, Sight, Viewpoint, ViewpointSet};
+use crate::visibility::{ScanImage, Sight, Viewpoint, ViewpointSet};
 
 /// Points of the scan that are looked for in the images of viewpoints.
 const POINTS: usize = 800;
-/// Places that a viewpoint met, which are looked for in the image of the scan.
-const POINTS_OF_VIEWPOINT: usize = 500;
-/// Viewpoints that are asked.
-const VIEWPOINTS: usize = 8;
-/// Viewpoints that are asked for each pose, at least.
-const VIEWPOINTS_OF_POSE: usize = 2;
-/// Viewpoints near a pose among which those are chosen that saw most of what the scan shows.
-const NEAR: usize = 32;
-/// Points that tell how much of it a viewpoint saw.
-const POINTS_TO_CHOOSE: usize = 64;
 /// Depths that differ by so many r_0 are the same.
 const TOLERANCE: f64 = 2.0;
-/// What a viewpoint met counts where its image tells the place to so many of these tolerances.
-const ERROR_MAX: f32 = 2.0;
-/// The level whose voxels tell whether the map still holds what a viewpoint met.
-const STILL_THERE_LEVEL: u32 = 2;
 /// How many times the deviation of as many single points the difference between two poses has that are equal in truth: points beside
-/// each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays; no test measures it.
+/// each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays.
 const CLUSTERING: f64 = 1.6;
 
 /// What rays of one side say of a pose: a number of points that were asked for.
@@ -71,25 +56,9 @@ pub struct Rival {
 #[derive(Debug)]
 pub(super) struct Rays {
     image: ScanImage,
-    points: Vec<Point>,
-    viewpoints: Arc<ViewpointSet>,
-    tolerance_m: f32,
-}
-
-/// The viewpoints that are asked about a scan, the same for all poses that are compared.
-#[derive(Debug)]
-pub(super) struct Witnesses {
-    viewpoints: Vec<Arc<Viewpoint>>,
-    /// What they met, and the map still holds.
-    met: Vec<MetInMap>,
-}
-
-/// A place that a viewpoint met, and the map still holds.
-#[derive(Debug)]
-struct MetInMap {
-    place_m: [f64; 3],
-    /// As [`Met::error_m`].
-    error_m: f32,
+    pub(super) points: Vec<Point>,
+    pub(super) viewpoints: Arc<ViewpointSet>,
+    pub(super) tolerance_m: f32,
 }
 
 /// What each point says of a scan at a pose: those of the scan, and those that the witnesses met.
@@ -100,7 +69,7 @@ pub(super) struct Look {
 }
 
 impl RayCounts {
-    fn of(sights: impl IntoIterator<Item = Sight>) -> Self {
+    pub(super) fn of(sights: impl IntoIterator<Item = Sight>) -> Self {
         sights.into_iter().fold(Self::default(), |counts, sight| Self {
             asked: counts.asked + 1,
             agree: counts.agree + usize::from(sight == Sight::Agrees),
@@ -149,57 +118,6 @@ impl Rays {
         Self { image: ScanImage::of(scan.points), points, viewpoints: map.viewpoints(), tolerance_m }
     }
 
-    /// The witnesses of a scan that was taken at one of some poses: for each, of the viewpoints near to it those that saw most of
-    /// what the scan shows there.
-    pub(super) fn witnesses(
-        &self,
-        map: &MultiResolutionMap,
-        poses: &[Pose],
-        stop: StopSignal<'_>,
-    ) -> Witnesses {
-        let mut viewpoints: Vec<Arc<Viewpoint>> = Vec::new();
-        for pose in poses {
-            let wish = VIEWPOINTS.div_ceil(poses.len()).max(VIEWPOINTS_OF_POSE);
-            for viewpoint in self.viewpoints_for(map, pose, wish, stop) {
-                if !viewpoints.iter().any(|other| Arc::ptr_eq(other, &viewpoint)) {
-                    viewpoints.push(viewpoint);
-                }
-            }
-        }
-        let met = met(map, &viewpoints, self.tolerance_m);
-        Witnesses { viewpoints, met }
-    }
-
-    fn viewpoints_for(
-        &self,
-        map: &MultiResolutionMap,
-        pose: &Pose,
-        wish: usize,
-        stop: StopSignal<'_>,
-    ) -> Vec<Arc<Viewpoint>> {
-        let distance_m = |viewpoint: &Viewpoint| {
-            (viewpoint.map_from_sensor().translation.vector - pose.translation.vector).norm()
-        };
-        let mut near: Vec<_> =
-            self.viewpoints.iter().map(|(_, it)| (distance_m(it), Arc::clone(it))).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(NEAR);
-        let nearest_m = near.first().map_or(f64::INFINITY, |(distance_m, _)| *distance_m);
-        let marched = marched::viewpoints_near(map, pose, nearest_m, wish, stop);
-        near.extend(marched.into_iter().map(|viewpoint| (distance_m(&viewpoint), viewpoint)));
-        let few = spread(&self.points, POINTS_TO_CHOOSE);
-        let tells = |viewpoint: &Viewpoint| {
-            let sights = few.iter().map(|point| self.sight_of(viewpoint, pose, *point));
-            sights.filter(|sight| matches!(sight, Sight::Agrees | Sight::Contradicts)).count()
-        };
-        let mut ranked: Vec<_> = near.into_iter().map(|(_, it)| (tells(&it), it)).collect();
-        ranked.sort_by_key(|(tells, _)| Reverse(*tells));
-        // One that looked elsewhere makes little of what the others agree on.
-        let most = ranked.first().map_or(0, |(tells, _)| *tells);
-        ranked.retain(|(tells, _)| 2 * tells >= most);
-        ranked.into_iter().take(wish).map(|(_, viewpoint)| viewpoint).collect()
-    }
-
     /// What the rays say of the scan at a pose. Once `stop` is set, nothing.
     pub(super) fn look(&self, pose: &Pose, witnesses: &Witnesses, stop: StopSignal<'_>) -> Look {
         if stop.is_stopped() {
@@ -217,25 +135,8 @@ impl Rays {
         Look { of_scan: of_scan.collect(), of_map: of_map.collect() }
     }
 
-    /// The share of what each witness met that another one contradicts, of what it says anything of: what moved, and what images are
-    /// too coarse for.
-    pub(super) fn contradicted_among(&self, witnesses: &Witnesses) -> f64 {
-        let Witnesses { viewpoints, .. } = witnesses;
-        let sights = viewpoints.iter().flat_map(|viewpoint| {
-            let others = viewpoints.iter().filter(move |other| !Arc::ptr_eq(other, viewpoint));
-            let met = viewpoint.image().met(POINTS_TO_CHOOSE, ERROR_MAX * self.tolerance_m);
-            others.flat_map(move |other| {
-                let of_met = |&Met { offset, error_m }: &Met| {
-                    let place = viewpoint.map_from_sensor() * Point3::from(offset.map(f64::from));
-                    other.image().sight(other.offset(place.into()), self.tolerance_m + error_m)
-                };
-                met.iter().map(of_met).collect::<Vec<_>>()
-            })
-        });
-        RayCounts::of(sights).contradicted_share()
-    }
-
-    fn sight_of(&self, viewpoint: &Viewpoint, pose: &Pose, point: Point) -> Sight {
+    /// What a viewpoint says of a point of the scan at a pose.
+    pub(super) fn sight_of(&self, viewpoint: &Viewpoint, pose: &Pose, point: Point) -> Sight {
         let place = pose * point.to_f64();
         viewpoint.image().sight(viewpoint.offset(place.into()), self.tolerance_m)
     }
@@ -263,32 +164,6 @@ impl Look {
         });
         if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) / CLUSTERING }
     }
-}
-
-/// What viewpoints met, the map still holds, and no other one of them saw through: at rims and on glass they differ.
-fn met(map: &MultiResolutionMap, viewpoints: &[Arc<Viewpoint>], tolerance_m: f32) -> Vec<MetInMap> {
-    let of_viewpoint = |viewpoint: &Arc<Viewpoint>| {
-        let map_from_sensor = *viewpoint.map_from_sensor();
-        let met = viewpoint.image().met(POINTS_OF_VIEWPOINT, ERROR_MAX * tolerance_m).into_iter();
-        met.map(move |Met { offset, error_m }| MetInMap {
-            place_m: (map_from_sensor * Point3::from(offset.map(f64::from))).into(),
-            error_m,
-        })
-    };
-    let met: Vec<MetInMap> = viewpoints.iter().flat_map(of_viewpoint).collect();
-    let points: Vec<Point> = met.iter().map(|met| Point::from(Point3::from(met.place_m))).collect();
-    let mut occupied = vec![0u64; points.len().div_ceil(64)];
-    let level = STILL_THERE_LEVEL.min(map.lattice().levels() - 1);
-    map.view().query(&points, &map.lattice().from_map(), level, Lookup::Exact, &mut occupied);
-    let is_there = |i: usize| occupied[i / 64] >> (i % 64) & 1 == 1;
-    let is_seen_through = |met: &MetInMap| {
-        let sights = viewpoints.iter().map(|viewpoint| {
-            viewpoint.image().sight(viewpoint.offset(met.place_m), tolerance_m + met.error_m)
-        });
-        sights.into_iter().any(|sight| sight == Sight::Contradicts)
-    };
-    let met = met.into_iter().enumerate().filter(|(i, met)| is_there(*i) && !is_seen_through(met));
-    met.map(|(_, met)| met).collect()
 }
 
 /// What most of those say that say anything; agreement of as many as contradict.
@@ -319,12 +194,15 @@ pub fn ray_agreement(
 ) -> RayAgreement {
     let scan = SampledScan::new(points, map.lattice().extent_m(), settings, StopSignal::NEVER);
     let rays = Rays::of(map, &scan);
-    let witnesses = rays.witnesses(map, &[*map_from_sensor], StopSignal::NEVER);
+    let witnesses = Witnesses::of(&rays, map, &[*map_from_sensor], StopSignal::NEVER);
     rays.look(map_from_sensor, &witnesses, StopSignal::NEVER).agreement()
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
     use crate::align::AlignmentSettings;
     use crate::map::{MapSettings, RobotName};
@@ -332,6 +210,11 @@ mod tests {
 
     /// A scan from (x, y) in a room of 8 x 6 m about the origin with a pillar, a ray every `step_deg`; sensor frame.
     fn scan(x: f32, y: f32, step_deg: f32) -> Vec<Point> {
+        scan_of(&[(2.0, 1.5)], x, y, step_deg)
+    }
+
+    /// [`scan`] with pillars, 0.8 m wide, at the given places.
+    fn scan_of(pillars: &[(f32, f32)], x: f32, y: f32, step_deg: f32) -> Vec<Point> {
         let steps = |from: f32, to: f32| {
             let count = ((to - from) / step_deg) as i32;
             (0..count).map(move |i| (from + i as f32 * step_deg).to_radians())
@@ -340,14 +223,13 @@ mod tests {
         rays.map(|(elevation, azimuth)| {
             let (sin, cos) = azimuth.sin_cos();
             let wall = |half: f32, from: f32, along: f32| (half.copysign(along) - from) / along;
-            // The pillar stands at (2, 1.5), 0.8 m wide.
-            let (dx, dy) = (2.0 - x, 1.5 - y);
-            let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
-            let pillar = if along > 0.0 && aside.abs() < 0.4 {
-                along - (0.16 - aside * aside).sqrt()
-            } else {
-                f32::MAX
+            let to_pillar = |&(at_x, at_y): &(f32, f32)| {
+                let (dx, dy) = (at_x - x, at_y - y);
+                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
+                let is_met = along > 0.0 && aside.abs() < 0.4;
+                if is_met { along - (0.16 - aside * aside).sqrt() } else { f32::MAX }
             };
+            let pillar = pillars.iter().map(to_pillar).fold(f32::MAX, f32::min);
             let range = wall(4.0, x, cos).min(wall(3.0, y, sin)).min(pillar);
             Point::new(range * cos, range * sin, range * elevation.tan())
         })
@@ -356,11 +238,17 @@ mod tests {
 
     /// A map of scans from the places of `places`, whose rays lie `step_deg` apart.
     fn map_of(places: &[(f32, f32)], resolution_m: f64, step_deg: f32) -> MultiResolutionMap {
+        let scans = places.iter().map(|&(x, y)| (scan(x, y, step_deg), x, y));
+        map_with(scans.collect(), resolution_m)
+    }
+
+    /// A map of scans that were taken, not turned, at (x, y).
+    fn map_with(scans: Vec<(Vec<Point>, f32, f32)>, resolution_m: f64) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(resolution_m, 5)).unwrap();
         let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
         let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
-        for &(x, y) in places {
-            let (points, pose) = (scan(x, y, step_deg), Pose::translation(x.into(), y.into(), 0.0));
+        for (points, x, y) in scans {
+            let pose = Pose::translation(x.into(), y.into(), 0.0);
             let scan = Scan { guess: Guess::Pose(pose), at_guess: true, ..Scan::new(&robot, &points) };
             mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
         }
@@ -384,6 +272,51 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn poses_that_are_equal_in_truth_differ_by_the_deviation_that_is_counted_with() {
+        // In a crowd, three within 48 square meters, they differ by one and a half of it.
+        let (alone, one, crowd) = (deviation_of_equals(0), deviation_of_equals(1), deviation_of_equals(3));
+        assert!(
+            alone < 0.5 && (0.2..1.0).contains(&one) && (one..2.0).contains(&crowd),
+            "{alone} {one} {crowd}"
+        );
+    }
+
+    /// The root mean square of z between two poses in a room that looks the same from both, but for people, who stand elsewhere in each
+    /// of the scans. Noise of 2 cm.
+    fn deviation_of_equals(people: usize) -> f64 {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut of_people = |people: usize, x: f32, y: f32| {
+            let mut at = |half: f32| random.random_range(-half..half);
+            let free = |(at_x, at_y): &(f32, f32)| (at_x - x).hypot(at_y - y) > 1.0;
+            let pillars: Vec<_> = (0..people).map(|_| (at(3.5), at(2.5))).filter(free).collect();
+            let mut points = scan_of(&pillars, x, y, 1.0);
+            points.iter_mut().for_each(|point| {
+                let scale = 1.0 + random.random_range(-0.02..0.02) / point.to_f64().coords.norm() as f32;
+                *point = Point::from(point.xyz().map(|c| c * scale));
+            });
+            points
+        };
+        let mut squares = Vec::new();
+        for k in 0..40 {
+            let (x, y) = (f32::from(k as u8 % 8) * 0.5 - 1.7, f32::from(k as u8 / 8) * 0.6 - 1.3);
+            let places = [(-2.0, -1.0), (-1.0, 1.5), (1.0, 0.0), (2.5, -2.0)];
+            let scans = places.map(|(x, y)| (of_people(people, x, y), x, y));
+            let map = map_with(scans.to_vec(), 0.1);
+            let points = of_people(people, x, y);
+            let settings = AlignmentSettings::default();
+            let scan = SampledScan::new(&points, map.lattice().extent_m(), &settings, StopSignal::NEVER);
+            let (x, y) = (f64::from(x), f64::from(y));
+            let turn = nalgebra::Vector3::z() * std::f64::consts::PI;
+            let poses = [Pose::translation(x, y, 0.0), Pose::new(nalgebra::Vector3::new(-x, -y, 0.0), turn)];
+            let rays = Rays::of(&map, &scan);
+            let witnesses = Witnesses::of(&rays, &map, &poses, StopSignal::NEVER);
+            let [truth, turned] = poses.map(|pose| rays.look(&pose, &witnesses, StopSignal::NEVER));
+            squares.push(truth.contradicted_more_than(&turned).powi(2));
+        }
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
     #[test]

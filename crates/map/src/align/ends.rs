@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::agreement::{Look, RayAgreement, Rays, Rival, Witnesses};
+use super::agreement::{Look, RayAgreement, Rays, Rival};
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
 use super::verdict::{Alignment, Verdict};
+use super::witnesses::Witnesses;
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
@@ -78,7 +79,7 @@ impl<'a> Ends<'a> {
         stop: StopSignal<'a>,
     ) -> Self {
         let poses: Vec<Pose> = found.iter().map(|end| end.map_from_sensor).collect();
-        let witnesses = rays.witnesses(map, &poses, stop);
+        let witnesses = Witnesses::of(rays, map, &poses, stop);
         let (resolution_m, overlap_min) = (map.lattice().resolution_m(0), settings.overlap_min);
         let lookups = found.iter().map(|end| end.lookups).sum();
         let mut ends =
@@ -212,7 +213,7 @@ impl<'a> Ends<'a> {
 
     /// The share of what each witness met that another one contradicts.
     pub(super) fn contradicted_among_witnesses(&self) -> f64 {
-        self.rays.contradicted_among(&self.witnesses)
+        self.witnesses.contradicted_among_each_other(self.rays.tolerance_m)
     }
 }
 

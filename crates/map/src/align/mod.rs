@@ -10,6 +10,7 @@
 //! stages          steps 2 to 5          an ascent at each level (ascent, overlap), and the sub-voxel stage (refine)
 //! verdict                               whether to believe the pose (information, slide, prior)
 //! agreement       ray_agreement         whether rays of scan and map agree
+//! witnesses                             which earlier scans are asked, and what they met
 //! marched                               what earlier scans must have seen, where they left no viewpoints
 //! rivals, ends    Contest, Ends         which of several ends to believe, by rays and by what is known beforehand
 //! elsewhere                             where else the scan may fit as well
@@ -44,6 +45,7 @@ mod stages;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod witnesses;
 
 pub use agreement::{RayAgreement, RayCounts, Rival, ray_agreement};
 pub use information::{Direction, PoseInformation};

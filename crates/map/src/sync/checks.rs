@@ -18,6 +18,7 @@ mod state {
         Held()
     }
 
+    /// Checks nothing: of release builds.
     #[inline(always)]
     pub fn before_file_operation() {}
 }
@@ -114,6 +115,7 @@ pub fn polled_by_runtime<F: Future>(future: F) -> impl Future<Output = F::Output
     })
 }
 
+/// Tells the checks, of which a release build has none, that whoever polls `future` is a runtime thread.
 #[cfg(not(debug_assertions))]
 pub fn polled_by_runtime<F: Future>(future: F) -> F {
     future
