@@ -4,6 +4,7 @@
 
 mod alignment_verdicts;
 mod localization;
+mod localization_scenes;
 mod map_history;
 mod recovery;
 mod stationary_robots;

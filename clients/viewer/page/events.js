@@ -72,8 +72,18 @@ export function wordsOf({ answer, error }) {
   return answer.stationary ? `stands still, ${overlap}` : overlap;
 }
 
-/** The answer in a sentence, with what it took. */
+/** The answer in a sentence, with the rivals that leave it open and what it took. */
 export function sentenceOf({ answer, error, points, duration_ms: took }) {
   const said = answer ? answer.reason : error?.detail;
-  return `${said ?? ""}\n${points} points, answered in ${Math.round(took)} ms`;
+  const rivals = (answer?.rivals ?? []).map(({ map_from_sensor: { translation_m: place }, rays }) => {
+    const where = place.map((value) => value.toFixed(2)).join(" ");
+    return `\nor at ${where} m: ${agreeOf(rays)}`;
+  });
+  return `${said ?? ""}${rivals.join("")}\n${points} points, answered in ${Math.round(took)} ms`;
 }
+
+/** How many of the rays that say anything agree, of the scan's and of what earlier scans met. */
+const agreeOf = ({ of_scan, of_map }) => [of_scan, of_map].map(({ agree, contradicted }) => {
+  const told = agree + contradicted;
+  return told > 0 ? `${Math.round((100 * agree) / told)} %` : "none";
+}).join(" and ") + " of rays agree";

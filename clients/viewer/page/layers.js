@@ -23,14 +23,18 @@ export function paths(robots, arrivals) {
 
 const REFUSED_SHOWN = 30;
 
-/** The last scans of robots that were refused, the newest of them, where their guesses put them. */
+/** The last scans of robots that were refused, the newest of them, where their guesses put them; with lines to the poses that are as likely. */
 export function refusedScans(events, size) {
   const shape = new Shape();
   const color = rgba(theme().refused);
   // Only what was refused has points.
   const refused = Array.from(events.last.values()).filter(({ guess, sample }) => guess && sample?.length > 0);
-  for (const { guess, sample } of refused.slice(-REFUSED_SHOWN)) {
+  for (const { guess, sample, answer } of refused.slice(-REFUSED_SHOWN)) {
     shape.marker(guess.translation_m, 1.5 * size, color);
+    for (const { map_from_sensor: rival } of answer?.rivals ?? []) {
+      shape.line(guess.translation_m, rival.translation_m, color);
+      shape.marker(rival.translation_m, 1.5 * size, color);
+    }
     for (const point of sample) shape.marker(add(guess.translation_m, rotate(guess.rotation_xyzw, point)), size / 2, color);
   }
   return shape;
