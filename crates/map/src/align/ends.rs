@@ -133,8 +133,8 @@ impl<'a> Ends<'a> {
     /// Why a pose is not to be believed, whatever its rivals are.
     fn reason_against(&self, found: &Alignment, agreement: &RayAgreement) -> Option<(Verdict, String)> {
         let RayAgreement { of_scan, of_map } = agreement;
-        let (a, b) = (of_scan.evidence(), of_map.evidence());
-        if a.max(b) < EVIDENCE_MIN || a.min(b) < EVIDENCE_OF_BOTH_MIN {
+        if !has_evidence(agreement) {
+            let (a, b) = (of_scan.evidence(), of_map.evidence());
             let words = "of the scan's points and of what earlier scans met in its view agree";
             let least =
                 format!("at least {EVIDENCE_MIN} of one and {EVIDENCE_OF_BOTH_MIN} of the other have to");
@@ -182,10 +182,10 @@ impl<'a> Ends<'a> {
     }
 
     /// What may as well be the truth as `best`: the ends elsewhere whose cost is little more, those that rays clearly prefer, since what
-    /// is known beforehand may be too sure of itself, and the guess itself, where rays do not contradict it.
+    /// is known beforehand may be too sure of itself, and the guess itself, where the scan would show what nobody saw so far.
     ///
-    /// An end of which a direction is open is not believed, but it is possible. So is the guess, where the scan may show what nobody
-    /// saw so far; of all other places where that holds nothing is asked, since there are always some.
+    /// An end of which a direction is open is not believed, but it is possible. Of places other than the guess where the scan would show
+    /// new ground only, nothing is asked, since there are always some.
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
         let own = best.cost(preferred);
@@ -194,16 +194,17 @@ impl<'a> Ends<'a> {
         let is_as_likely = |end: &&End| {
             end.cost(preferred) - own <= RIVAL || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
         };
-        let ends = self.all.iter().filter(|end| end.has_evidence());
+        let ends = self.all.iter().filter(|end| has_evidence(&end.agreement));
         let ends = ends.filter(|end| is_elsewhere(&end.alignment.map_from_sensor)).filter(is_as_likely);
         let of_end =
             |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
-        let guess = self.prior.map(|prior| prior.guess).filter(is_elsewhere);
-        let at_guess = guess.map(|guess| (guess, self.rays.look(&guess, &self.witnesses, self.stop)));
-        let at_guess = at_guess.filter(|(_, look)| cost(0.0, look, &preferred.look) - own <= RIVAL);
-        let of_guess =
-            |(map_from_sensor, look): (Pose, Look)| Rival { map_from_sensor, agreement: look.agreement() };
-        ends.map(of_end).chain(at_guess.map(of_guess)).collect()
+        let guess = self.prior.map(|prior| prior.guess).filter(is_elsewhere).and_then(|map_from_sensor| {
+            let look = self.rays.look(&map_from_sensor, &self.witnesses, self.stop);
+            let agreement = look.agreement();
+            let is_as_likely = cost(0.0, &look, &preferred.look) - own <= RIVAL;
+            (!has_evidence(&agreement) && is_as_likely).then_some(Rival { map_from_sensor, agreement })
+        });
+        ends.map(of_end).chain(guess).collect()
     }
 
     /// How rays agree at some other pose.
@@ -224,15 +225,16 @@ impl End {
         cost(self.deviations, &self.look, &preferred.look)
     }
 
-    /// True where the scan and earlier scans saw enough of each other.
-    fn has_evidence(&self) -> bool {
-        !matches!(self.against, Some((Verdict::LowOverlap, _)))
-    }
-
     /// How much more rays contradict this end than another, in standard deviations.
     fn is_contradicted_more_than(&self, other: &Self) -> f64 {
         self.look.contradicted_more_than(&other.look)
     }
+}
+
+/// True of a pose at which the scan and earlier scans saw enough of each other to be compared.
+fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
+    let (a, b) = (of_scan.evidence(), of_map.evidence());
+    a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
 /// [`End::cost`] of a pose that is so many standard deviations from the guess.
