@@ -55,7 +55,7 @@ class GridOperations(MapHandle):
         min_revision: int | None = None,
         map_uuid: str | None = None,
     ) -> Grid:
-        """The map from above: a cell is occupied where a voxel in it has its center between `min_z_m` and `max_z_m`.
+        """The map from above: a cell is occupied where a voxel in it reaches between `min_z_m` and `max_z_m`.
 
         `area` has shape (2, 2): the smallest x y, then the largest; all of the map without it. `cell_m` is a whole number of voxels
         of the level. With `tell_unknown` cells that scans saw through are told from those that nobody saw.

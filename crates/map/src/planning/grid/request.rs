@@ -7,8 +7,8 @@ pub struct GridRequest {
     pub level: u32,
     /// Which part of the map, seen from above.
     pub area: GridArea,
-    /// Lowest and highest height, meters: voxels count whose centers lie between them or on them. Infinite ones are
-    /// fine.
+    /// Lowest and highest height, meters: voxels count that reach between them, by more than a border; where the two
+    /// are the same, the voxel there. Infinite ones are fine.
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels.
     pub cell_m: f64,
