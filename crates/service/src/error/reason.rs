@@ -119,7 +119,7 @@ reasons! {
         NothingThere "nothing_there" Both: "the search box lies away from the map", "correct it";
         PageTooLarge "page_too_large" Both: "`limit` is not 1 to `trajectory_page_max`", "ask for pages by `since_revision`";
         PointNotFinite "point_not_finite" Both: "NaN or infinity in a query, or in a `strict` scan", "remove the point";
-        PointOutOfRange "point_out_of_range" Both: "a point outside the map's range", "remove it; is the unit meters?";
+        PointOutOfRange "point_out_of_range" Both: "a point, a body, the end of a ray or a box outside the map's range: of what is there no voxel can tell", "remove it; is the unit meters?";
         ProbeBody "probe_body" Both: "the body of a health check exceeds `probe_body_bytes_max`", "send none";
         ScanOutOfRange "scan_out_of_range" Both: "no point of the scan lies within the map's range", "correct the pose";
         TimeLimitTooLong "time_limit_too_long" Both: "`time_limit_s` exceeds `localization_time_max_s`", "ask for less";

@@ -106,6 +106,7 @@ impl From<GridError> for ServiceError {
                 let message = format!("grid_cells_max: {error}: ask for a smaller area or larger cells");
                 Self::new(Reason::GridTooLarge, message)
             }
+            GridError::BandRange { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),
             _ => Self::new(Reason::BadGrid, error.to_string()),
         }
     }

@@ -60,6 +60,12 @@ fn ranges(view: &MapView<'_>, request: &FrontierRequest) -> Result<[[i32; 2]; 3]
     if !is_box {
         return Err(FrontierError::Corners(min_m, max_m));
     }
+    let (low_m, end_m) = view.lattice().range_m();
+    for (field, value) in [("min_m", min_m), ("max_m", max_m)] {
+        if !value.iter().all(|c| (low_m..=end_m).contains(c)) {
+            return Err(FrontierError::Range { field, value, min_m: low_m, end_m });
+        }
+    }
     let ranges: [[i32; 2]; 3] = std::array::from_fn(|axis| {
         window::within_lattice(indices_in(view.lattice(), level, [min_m[axis], max_m[axis]]), level)
     });

@@ -34,6 +34,10 @@ impl<'a> Projection<'a> {
         if !is_in_order {
             return Err(GridError::Band(band_m));
         }
+        let (min_m, end_m) = view.lattice().range_m();
+        if band_m[1] < min_m || band_m[0] >= end_m {
+            return Err(GridError::BandRange { band_m, min_m, end_m });
+        }
         let voxel_m = view.lattice().resolution_m(level);
         let cell_voxels =
             whole(cell_m / voxel_m).filter(|voxels| (1.0..=f64::from(INDEX_MAX)).contains(voxels));

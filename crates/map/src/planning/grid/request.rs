@@ -54,6 +54,16 @@ pub enum GridError {
     /// A band with NaN or in the wrong order.
     #[error("min_z_m must be at most max_z_m, got {} and {}", .0[0], .0[1])]
     Band([f64; 2]),
+    /// A band in which no map of this resolution can have a voxel.
+    #[error("min_z_m and max_z_m must have a height of {min_m}..{end_m} m between them, as the map has, got {} and {}", .band_m[0], .band_m[1])]
+    BandRange {
+        /// The band, meters.
+        band_m: [f64; 2],
+        /// The smallest coordinate of the map, meters.
+        min_m: f64,
+        /// One past the largest.
+        end_m: f64,
+    },
     /// A cell that is no whole number of voxels.
     #[error("cell_m must be a whole number of voxels of {voxel_m} m, got {cell_m}")]
     Cell {
