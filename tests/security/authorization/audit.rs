@@ -123,6 +123,35 @@ async fn a_change_is_written_with_who_asked_for_it_and_what_it_did() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_line_for_people_says_each_thing_of_its_request_once() {
+    let (folder, keyring) = (tempfile::tempdir().unwrap(), Keyring::empty());
+    let operator = keyring.add("operator", Scope::Admin, None);
+    let (file, log) = (keyring.file(), folder.path().join("log"));
+    let (data, log_file) = (folder.path().join("data"), File::create(&log).unwrap().into());
+    let options = ["--keys-file", file.to_str().unwrap(), "--log-format", "text"];
+    let server = Process::start_with_log(data.to_str().unwrap(), &options, "debug", log_file);
+    let made = client().put(format!("{}/v1/maps/a", server.http)).bearer_auth(operator.reveal());
+    assert_eq!(made.json(&json!({"resolution_m": 0.1})).send().await.unwrap().status(), StatusCode::CREATED);
+    // What needs no key is written with whose it is, too.
+    let alive = client().get(format!("{}/livez", server.http)).bearer_auth(operator.reveal());
+    assert_eq!(alive.send().await.unwrap().status(), StatusCode::OK);
+    assert_eq!(server.stop(), Some(0));
+    let text = fs::read_to_string(&log).unwrap();
+    let of_requests: Vec<&str> = text.lines().filter(|line| line.contains("request{")).collect();
+    assert!(of_requests.len() >= 3, "{text}");
+    for (line, name) in of_requests
+        .iter()
+        .flat_map(|line| ["key=", "protocol=", "peer=", "request_id="].map(|name| (line, name)))
+    {
+        assert_eq!(
+            line.matches(&format!(" {name}")).count() + line.matches(&format!("{{{name}")).count(),
+            1,
+            "{line}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn refused_keys_are_written_and_a_flood_of_them_is_counted() {
     let audited = Audited::start(&[]);
     let unknown = Secret::random().unwrap();
