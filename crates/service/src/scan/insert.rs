@@ -7,7 +7,7 @@ use super::submit::{Effort, Judged};
 use crate::error::ServiceError;
 use crate::map_service::MapService;
 use crate::maps::HostedMap;
-use crate::observer::{JudgedScan, Outcome};
+use crate::observer::{Change, JudgedScan, Outcome};
 use crate::request::{ScanAnswer, ScanRequest};
 use crate::work::{Pools, TimeLimit};
 use mrol_map::map::MapName;
@@ -17,13 +17,16 @@ impl MapService {
     /// Aligns a scan and, where it fits, adds it.
     ///
     /// # Errors
-    /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
+    /// `PermissionDenied` for a robot that is not the caller's, and with `scope_too_small` for a caller that sends scans
+    /// alone and asks to carve; `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
     /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let robot = scan.robot.clone();
         let work = async {
             self.scans.permit(&scan.robot)?;
+            let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
+            self.scans.permit_carving(&scan.robot, scan.carve, by_settings)?;
             let (map, scan) = (self.map(map)?, Arc::new(scan));
             let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
             let judged = self.judge(&map, &scan).await;
@@ -42,6 +45,7 @@ impl MapService {
                 align_time: answer.align_time,
                 replayed: answer.replayed,
                 recovered: answer.recovered,
+                carved: Change::of_carving(answer),
             })
         })
         .await
@@ -70,7 +74,9 @@ impl MapService {
         let Pools { mapping, long_mapping, .. } = &self.inner.pools;
         let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
         loop {
-            if let Some(judged) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
+            if let Some(judged) =
+                self.submit_and_wait(("InsertScan", map), pool, thread.take(), submit(effort)).await?
+            {
                 return Ok(judged);
             }
             (pool, effort) = (long_mapping, Effort::Whole);
