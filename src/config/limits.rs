@@ -21,6 +21,8 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.scrapes_max", limits.scrapes_max, 1, "1 to 1048576"),
         ("limits.health_watches_max", limits.health_watches_max, 0, "0 to 1048576"),
         ("limits.watches_max", limits.watches_max, 0, "0 to 1048576"),
+        ("limits.caller_watches_max", limits.caller_watches_max, 0, "0 to 1048576"),
+        ("limits.caller_streams_max", limits.caller_streams_max, 0, "0 to 1048576"),
         ("limits.connections_reserved", limits.connections_reserved, 0, "0 to 1048576"),
     ] {
         if !(least..=1 << 20).contains(&value) {

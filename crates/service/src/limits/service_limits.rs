@@ -63,6 +63,11 @@ pub struct Limits {
     pub health_watch_max_s: f64,
     /// Watches of maps at once, over both protocols. 256.
     pub watches_max: usize,
+    /// Watches of one caller at once: of a key, or of an address where there is none; 0 = any number. A quarter of
+    /// `watches_max`, so that nobody has them all. 64.
+    pub caller_watches_max: usize,
+    /// Streams of one caller at once, as `caller_watches_max`. Half of `streams_max`. 128.
+    pub caller_streams_max: usize,
     /// Longest time between two messages of a watch, where nothing changes. 10 s.
     pub watch_heartbeat_s: f64,
     /// How long a watch's client may take no message, until the watch ends. 30 s.
@@ -181,6 +186,8 @@ impl Default for Limits {
             health_watches_max: 16,
             health_watch_max_s: 600.0,
             watches_max: 256,
+            caller_watches_max: 64,
+            caller_streams_max: 128,
             watch_heartbeat_s: 10.0,
             watch_unread_max_s: 30.0,
             events_per_map_max: 256,
