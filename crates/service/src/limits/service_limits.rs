@@ -125,6 +125,9 @@ pub struct Limits {
     pub viewpoint_bytes_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
     pub robots_per_map_max: usize,
+    /// Robots with scans in a map that one caller brought in since the map was opened: the holder of a key, or an
+    /// address where there is none; 0 = any number. A quarter of `robots_per_map_max`. 1,024.
+    pub robots_per_caller_max: usize,
     /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
     pub jobs_waiting_max: usize,
     /// Bytes of a map file that is restored, before and after compression. 1 GiB.
@@ -214,6 +217,7 @@ impl Default for Limits {
             keep_out_corners_max: PRISM_CORNERS_MAX,
             viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             robots_per_map_max: 4_096,
+            robots_per_caller_max: 1_024,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
             map_file_scans_max: 20_000_000,
