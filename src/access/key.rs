@@ -99,7 +99,8 @@ impl Key {
 
     /// Whose scans its holder may send and undo.
     pub(super) fn allowed_scans(&self) -> AllowedScans {
-        AllowedScans { robots: self.robots.clone(), undo_of_others: self.scope >= Scope::Write }
+        let writes = self.scope >= Scope::Write;
+        AllowedScans { robots: self.robots.clone(), undo_of_others: writes, carving_on_request: writes }
     }
 
     /// True where its time is up at `now`.

@@ -99,13 +99,15 @@ impl Access {
             return Ok(Caller::without_key(AllowedMaps::Every));
         }
         let key = secret.and_then(|secret| keys.current().find(secret));
+        if let Some(key) = &key {
+            // The log names whoever is refused, too. Once: a text log appends what is recorded again.
+            tracing::Span::current().record("key", key.name.as_str());
+        }
         let Some(scope) = operation.scope() else {
             let key = key.filter(|key| !key.is_expired(SystemTime::now()));
             return Ok(key.map_or_else(|| Caller::without_key(AllowedMaps::none()), Caller::with));
         };
         let key = key.ok_or_else(|| no_key(operation, secret.is_some()))?;
-        // The log names whoever is refused, too.
-        tracing::Span::current().record("key", key.name.as_str());
         if let Some(refusal) = key.expired(SystemTime::now()) {
             return Err(refusal);
         }

@@ -22,6 +22,7 @@ use super::metered_body::MeteredBody;
 use super::probes::Probes;
 use super::quota::Quota;
 use super::rate::Rates;
+use super::shares::Shares;
 use crate::access::{Authorized, Operation};
 use crate::telemetry::InUse;
 use mrol_service::{Limits, ServiceError};
@@ -38,6 +39,9 @@ struct Inner {
     at_once_max: Option<NonZeroU32>,
     streams: Quota,
     watches: Quota,
+    /// Streams and watches of one caller.
+    stream_shares: Shares,
+    watch_shares: Shares,
     bodies: Bodies,
     probes: Probes,
 }
@@ -67,6 +71,8 @@ impl Admission {
             at_once_max: NonZeroU32::new(limits.caller_requests_at_once_max),
             streams: Quota::new("streams_max", limits.streams_max),
             watches: Quota::new("watches_max", limits.watches_max),
+            stream_shares: Shares::new("caller_streams_max", "streams", limits.caller_streams_max),
+            watch_shares: Shares::new("caller_watches_max", "watches", limits.caller_watches_max),
             bodies: Bodies::new(limits),
             probes: Probes::new(limits),
         }))
@@ -91,11 +97,14 @@ impl Admission {
         if operation.is_probe() {
             return self.0.probes.answer(operation, request, endings, handle).await;
         }
-        let place = match operation {
-            watch if watch.is_watch() => Some(self.0.watches.take()?),
-            _ => operation.is_stream().then(|| self.0.streams.take()).transpose()?,
-        };
         let asking = RateLimitKey::of(request.extensions());
+        let of = match operation {
+            watch if watch.is_watch() => Some((&self.0.watch_shares, &self.0.watches)),
+            _ => operation.is_stream().then_some((&self.0.stream_shares, &self.0.streams)),
+        };
+        // Its own share first, so that a caller who has it is told that and not that others have too much.
+        let share = of.map(|(shares, _)| asking.take(shares)).transpose()?;
+        let place = of.map(|(_, quota)| quota.take()).transpose()?;
         self.check_rate(&asking)?;
         let own_place = asking.begin(self.0.at_once_max)?;
         let hang_up = request.extensions().get().cloned();
@@ -113,7 +122,7 @@ impl Admission {
                 bytes => arrival.add(bytes)?,
             }
         }
-        let held = (place, own_place, held, let_in);
+        let held = (place, share, own_place, held, let_in);
         Ok(response.map(|body| Body::new(AnswerBody::new(body, Some(arrival), held, endings))))
     }
 

@@ -25,6 +25,7 @@ pub(super) mod off_runtime;
 mod probes;
 mod quota;
 mod rate;
+mod shares;
 
 pub use admit::{Admission, AnswerBytes};
 pub use answer_body::{Ending, Endings};

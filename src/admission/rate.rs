@@ -9,6 +9,7 @@ use governor::clock::{Clock, DefaultClock};
 use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
+use super::shares::{Share, Shares};
 use crate::access::{Allowance, Authorized, InWork, asker_of};
 use mrol_service::{Asker, Limits, ServiceError};
 
@@ -35,6 +36,14 @@ impl RateLimitKey {
     pub(super) fn check_rate(&self, rates: Option<&Rates>) -> Result<(), ServiceError> {
         let own = self.own.as_ref().and_then(|own| own.check_rate(self.asker.as_str()));
         own.unwrap_or_else(|| rates.map_or(Ok(()), |rates| rates.check(self)))
+    }
+
+    /// Takes one of the caller's share.
+    ///
+    /// # Errors
+    /// When the caller has all of it.
+    pub(super) fn take(&self, shares: &Shares) -> Result<Option<Share>, ServiceError> {
+        shares.take(&self.asker)
     }
 
     /// Takes a place among those of the caller's key, which are as many as it says, or `usual`.

@@ -36,7 +36,7 @@ pub(super) struct DrawGrid {
     /// Where to write the image; the description gets the same name with .yaml
     #[arg(long, value_name = "FILE.pgm")]
     out: PathBuf,
-    /// Lowest and highest height of voxels that count, meters: their centers lie between [default: all]
+    /// Lowest and highest height in meters: voxels count that reach between [default: all]
     #[arg(long, value_name = "Z Z", allow_hyphen_values = true, value_parser = parse::band)]
     band: Option<[f64; 2]>,
     /// The rectangle to draw: smallest and largest x y, meters [default: all that there is]

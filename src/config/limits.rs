@@ -15,12 +15,15 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.streams_max", limits.streams_max, 1, "1 to 1048576"),
         ("limits.trajectory_page_max", limits.trajectory_page_max, 1, "1 to 1048576"),
         ("limits.robots_per_map_max", limits.robots_per_map_max, 1, "1 to 1048576"),
+        ("limits.robots_per_caller_max", limits.robots_per_caller_max, 0, "0 to 1048576"),
         ("limits.jobs_waiting_max", limits.jobs_waiting_max, 0, "0 to 1048576"),
         ("limits.probes_max", limits.probes_max, 1, "1 to 1048576"),
         ("limits.probe_body_bytes_max", limits.probe_body_bytes_max, 64, "64 to 1048576"),
         ("limits.scrapes_max", limits.scrapes_max, 1, "1 to 1048576"),
         ("limits.health_watches_max", limits.health_watches_max, 0, "0 to 1048576"),
         ("limits.watches_max", limits.watches_max, 0, "0 to 1048576"),
+        ("limits.caller_watches_max", limits.caller_watches_max, 0, "0 to 1048576"),
+        ("limits.caller_streams_max", limits.caller_streams_max, 0, "0 to 1048576"),
         ("limits.connections_reserved", limits.connections_reserved, 0, "0 to 1048576"),
     ] {
         if !(least..=1 << 20).contains(&value) {

@@ -71,7 +71,6 @@ impl Middleware {
         let authorized = self.gate.authorize(operation, &mut request)?;
         let caller = authorized.caller.clone();
         if let Some(key) = caller.name() {
-            Span::current().record("key", key);
             self.recorder.metrics().key_used(P::NAME, key);
         }
         request.extensions_mut().insert(authorized);

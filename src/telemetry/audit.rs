@@ -1,4 +1,4 @@
-//! The audit: a log line for each change by an operator, and for each key that was refused.
+//! The audit: a log line for each change by an operator, for each scan that carved, and for each key that was refused.
 //!
 //! Lines have the target [`AUDIT`] and lie within the request's span, which says the protocol, the request id, the key
 //! and the peer.
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 
-use mrol_service::{Change, End, Ended, MapVersion, Observer, Outcome, Reason};
+use mrol_service::{Change, End, Ended, JudgedScan, MapVersion, Observer, Outcome, Reason};
 
 /// The target of the audit's lines.
 pub const AUDIT: &str = "mrol::audit";
@@ -77,26 +77,33 @@ impl Refusals {
     }
 }
 
+/// Writes a change that was made; `robot` is that of a scan that carved.
+fn write_change(operation: &str, map: Option<&str>, change: &Change, robot: Option<&str>) {
+    let Change { before, after, voxels_removed, voxels_restored, .. } = change;
+    let Change { scans_undone, deletions_undone, replayed, .. } = change;
+    let uuid = after.or(*before).map(|version| version.map_uuid.to_string());
+    let uuid_before = before.filter(|before| after.is_some_and(|after| after.map_uuid != before.map_uuid));
+    let uuid_before = uuid_before.map(|before| before.map_uuid.to_string());
+    let revision = |version: &Option<MapVersion>| version.map(|version| version.revision);
+    let (revision_before, revision) = (revision(before), revision(after));
+    let outcome = if *replayed { "unchanged" } else { "done" };
+    tracing::info!(
+        target: AUDIT, operation, map, robot, uuid, uuid_before, revision_before, revision, voxels_removed,
+        voxels_restored, scans_undone, deletions_undone, outcome, "change"
+    );
+}
+
 /// Writes changes of maps, done, failed or left by their callers.
 impl Observer for Audit {
     fn operation_ended(&self, ended: &Ended<'_>) {
         let Ended { operation, map, end, .. } = ended;
         let map = map.map(|map| map.as_str());
         match end {
-            End::Done(Outcome::Changed(change)) => {
-                let Change { before, after, voxels_removed, voxels_restored, .. } = change;
-                let Change { scans_undone, deletions_undone, replayed, .. } = change;
-                let uuid = after.or(*before).map(|version| version.map_uuid.to_string());
-                let uuid_before =
-                    before.filter(|before| after.is_some_and(|after| after.map_uuid != before.map_uuid));
-                let uuid_before = uuid_before.map(|before| before.map_uuid.to_string());
-                let revision = |version: &Option<MapVersion>| version.map(|version| version.revision);
-                let (revision_before, revision) = (revision(before), revision(after));
-                let outcome = if *replayed { "unchanged" } else { "done" };
-                tracing::info!(
-                    target: AUDIT, operation, map, uuid, uuid_before, revision_before, revision, voxels_removed,
-                    voxels_restored, scans_undone, deletions_undone, outcome, "change"
-                );
+            End::Done(Outcome::Changed(change)) | End::DoneUnheard(change) => {
+                write_change(operation, map, change, None);
+            }
+            End::Done(Outcome::Scan(JudgedScan { robot, carved: Some(change), .. })) => {
+                write_change(operation, map, change, Some(robot.as_str()));
             }
             End::Done(_) => {}
             End::Failed(error) if CHANGES.contains(operation) => {

@@ -306,6 +306,24 @@ async fn a_watch_over_http_is_the_same_messages_behind_their_lengths() {
 }
 
 #[tokio::test]
+async fn one_address_without_a_key_leaves_watches_to_others() {
+    let daemon = Daemon::start_with(|config| {
+        (config.limits.watches_max, config.limits.caller_watches_max) = (3, 2);
+    })
+    .await;
+    daemon.make_map("a").await;
+    let client = client_of(&daemon).await;
+    let mut watches = Vec::new();
+    for _ in 0..2 {
+        watches.push(client.watch(&map("a"), WatchRequest::default()).await.unwrap());
+    }
+    let refused = client.watch(&map("a"), WatchRequest::default()).await.unwrap_err().to_string();
+    assert!(refused.contains("caller_watches_max is 2") && refused.contains("127.0.0.1"), "{refused}");
+    let refused = json_of(daemon.get("/v1/maps/a/watch").await).await;
+    assert_eq!(refused["reason"], "overloaded", "{refused}");
+}
+
+#[tokio::test]
 async fn watches_have_a_limit_of_their_own() {
     let daemon = Daemon::start_with(|config| config.limits.watches_max = 3).await;
     daemon.make_map("a").await;

@@ -529,7 +529,8 @@ typedef struct mrol_grid_question {
      * side, and every cell that the area meets belongs to the grid. */
     double area_min_m[2];
     double area_max_m[2];
-    /* Voxels count whose centers lie between these heights or on them, where has_min_z and has_max_z are 1. */
+    /* Voxels count that reach between these heights, by more than a border, where has_min_z and has_max_z are 1; where both
+     * lie in one voxel, that one. */
     double min_z_m;
     double max_z_m;
     /* Side of a cell: a whole number of the level's voxels. 0: one voxel. */

@@ -8,13 +8,15 @@ use super::commit::{Refusal, Step};
 use super::error::{Reason, ServiceError};
 use super::limits::Limits;
 use super::maps::{Catalog, HostedMap};
-use super::observer::{End, Ended, Outcome};
+use super::observer::{Change, End, Ended, Outcome};
 use super::resources::{Readings, ResourceBudget, Shortage};
 use super::settings::ServiceSettings;
 use super::work::{Asker, FreeThread, Pool, PoolUse, Pools};
-use mrol_map::map::{CallerName, MapName};
+use mrol_map::map::{CallerName, Committed, MapName};
 use mrol_map::util::StopSignal;
 use mrol_store::OpeningProgress;
+use tokio::sync::oneshot;
+use tracing::Instrument;
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
 ///
@@ -131,9 +133,11 @@ impl MapService {
     }
 
     /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares
-    /// it again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it.
+    /// it again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it;
+    /// of one who goes away later the observers are told what the operation removed from the map all the same.
     pub(super) async fn submit_and_wait<A: Send + 'static>(
         &self,
+        (operation, map): (&'static str, &Arc<HostedMap>),
         pool: &Pool,
         mut first: Option<FreeThread>,
         submit: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
@@ -145,13 +149,23 @@ impl MapService {
             };
             match pool.run_on(thread, submit.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
-                Step::Submitted(outcome, answer) => match outcome.await.map_err(commit_thread_ended)? {
+                Step::Submitted(outcome, answer) => match self.outcome_of(operation, map, outcome).await? {
                     Ok(committed) => return Ok(answer(committed)),
                     Err(Refusal::Failed(error)) => return Err(error),
                     Err(Refusal::Stale) => {}
                 },
             }
         }
+    }
+
+    async fn outcome_of(
+        &self,
+        operation: &'static str,
+        map: &Arc<HostedMap>,
+        outcome: oneshot::Receiver<Result<Committed, Refusal>>,
+    ) -> Result<Result<Committed, Refusal>, ServiceError> {
+        let mut submitted = Submitted { service: self, operation, map, outcome };
+        (&mut submitted.outcome).await.map_err(commit_thread_ended)
     }
 
     pub(super) fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
@@ -171,6 +185,35 @@ impl Drop for Pending<'_> {
         let Self { service, operation, map } = *self;
         let caller = service.caller.as_ref();
         service.tell(&Ended { operation, caller, map, end: End::CallerGone });
+    }
+}
+
+/// A change on its way into a map: dropped before its outcome is heard, its caller has gone.
+struct Submitted<'a> {
+    service: &'a MapService,
+    operation: &'static str,
+    map: &'a Arc<HostedMap>,
+    outcome: oneshot::Receiver<Result<Committed, Refusal>>,
+}
+
+impl Drop for Submitted<'_> {
+    fn drop(&mut self) {
+        if self.outcome.is_terminated() {
+            return;
+        }
+        let Ok(runtime) = tokio::runtime::Handle::try_current() else { return };
+        let (_, none) = oneshot::channel();
+        let outcome = std::mem::replace(&mut self.outcome, none);
+        let (service, map, operation) = (self.service.clone(), Arc::clone(self.map), self.operation);
+        let told = async move {
+            let Ok(Ok(committed)) = outcome.await else { return };
+            if committed.removed > 0 {
+                let change = Change::of_removal(map.version(committed.version()), committed.removed);
+                let (caller, end) = (service.caller.as_ref(), End::DoneUnheard(change));
+                service.tell(&Ended { operation, caller, map: Some(&map.name), end });
+            }
+        };
+        runtime.spawn(told.in_current_span());
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::time::Duration;
 
 use super::error::ServiceError;
-use super::request::{DeletionAnswer, KeepOutAnswer, MapVersion, UndoAnswer};
+use super::request::{DeletionAnswer, KeepOutAnswer, MapVersion, ScanAnswer, UndoAnswer};
 use mrol_map::align::Verdict;
 use mrol_map::map::{CallerName, Lookup, MapName, RobotName};
 use mrol_map::mapping::Recovered;
@@ -39,6 +39,8 @@ pub enum End<'a> {
     Failed(&'a ServiceError),
     /// The caller went away first. A change that was decided on by then is made all the same.
     CallerGone,
+    /// A change that removed voxels was made after its caller had gone, which was told of as [`End::CallerGone`].
+    DoneUnheard(Change),
 }
 
 /// What an operation did.
@@ -74,9 +76,11 @@ pub struct JudgedScan {
     pub replayed: bool,
     /// How its robot, which was lost, was found again.
     pub recovered: Option<Recovered>,
+    /// What it carved, where it took voxels out of the map.
+    pub carved: Option<Change>,
 }
 
-/// What a change by an operator did.
+/// What a change of a map did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Change {
     /// The map's version before: another uuid where another map was replaced; none of a map that was not there.
@@ -111,6 +115,17 @@ impl Change {
             deletions_undone: deletions,
             ..Self::of_revision(version, !replayed && scans + deletions > 0)
         }
+    }
+
+    /// What a scan carved; none where it took nothing out, or was answered before.
+    pub(super) fn of_carving(answer: &ScanAnswer) -> Option<Self> {
+        let &ScanAnswer { carved_voxels, version, replayed, .. } = answer;
+        (carved_voxels > 0 && !replayed).then(|| Self::of_removal(version, carved_voxels))
+    }
+
+    /// What removed so many voxels and led to `after`.
+    pub(super) fn of_removal(after: MapVersion, voxels_removed: usize) -> Self {
+        Self { voxels_removed, ..Self::of_revision(after, true) }
     }
 
     /// A keep-out that was put or removed.

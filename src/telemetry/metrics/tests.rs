@@ -10,7 +10,7 @@ use std::time::Duration;
 /// A scan that was judged.
 fn judged(robot: &str, verdict: Verdict) -> JudgedScan {
     let (robot, align_time) = (RobotName::new(robot).unwrap(), Duration::from_millis(30));
-    JudgedScan { robot, verdict, overlap: 0.25, align_time, replayed: false, recovered: None }
+    JudgedScan { robot, verdict, overlap: 0.25, align_time, replayed: false, recovered: None, carved: None }
 }
 
 /// Tells `metrics` that something was done to `map`.

@@ -122,6 +122,70 @@ async fn a_change_is_written_with_who_asked_for_it_and_what_it_did() {
     assert!(uuid.is_string() && lines[1..5].iter().all(|line| line["uuid"] == *uuid), "{lines:#?}");
 }
 
+/// What a sensor sees of a wall so far before it, a point every 1.5 degrees.
+fn wall(x: f32) -> Vec<[f32; 3]> {
+    let angles = || (-20..=20).map(|i| (i as f32 * 1.5).to_radians().tan());
+    angles().flat_map(|y| angles().map(move |z| [x, x * y, x * z])).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_that_carves_is_written_with_how_much_it_took_out() {
+    let audited = Audited::start(&[]);
+    let key = Some(&audited.operator);
+    let made = json!({"resolution_m": 0.1, "levels": 3});
+    assert_eq!(
+        audited.http(Method::PUT, "/v1/maps/a", "made", key, made).await.status(),
+        StatusCode::CREATED
+    );
+    let scan = |robot: &str, wall_m: f32| {
+        let guess = json!({"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]});
+        json!({"robot": robot, "points": wall(wall_m), "align": false, "carve": true, "guess": guess})
+    };
+    let mut carved = Vec::new();
+    for (robot, wall_m) in [("r2", 2.0), ("r1", 3.0)] {
+        let inserted = audited.http(Method::POST, "/v1/maps/a/scans", robot, key, scan(robot, wall_m)).await;
+        let answer: Value = inserted.json().await.unwrap();
+        carved.push(answer["carved_voxels"].as_u64().unwrap());
+    }
+    assert!(carved[0] == 0 && carved[1] > 100, "{carved:?}");
+
+    let lines = audited.ended();
+    let told: Vec<_> = lines.iter().filter(|line| line["operation"] == "InsertScan").collect();
+    assert_eq!(told.len(), 1, "{lines:#?}");
+    let fields = ["robot", "map", "outcome", "voxels_removed", "revision"].map(|name| told[0][name].clone());
+    assert_eq!(Value::from(fields.to_vec()), json!(["r1", "a", "done", carved[1], 2]));
+    assert_eq!((&told[0]["span"]["key"], &told[0]["span"]["request_id"]), (&json!("operator"), &json!("r1")));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_line_for_people_says_each_thing_of_its_request_once() {
+    let (folder, keyring) = (tempfile::tempdir().unwrap(), Keyring::empty());
+    let operator = keyring.add("operator", Scope::Admin, None);
+    let (file, log) = (keyring.file(), folder.path().join("log"));
+    let (data, log_file) = (folder.path().join("data"), File::create(&log).unwrap().into());
+    let options = ["--keys-file", file.to_str().unwrap(), "--log-format", "text"];
+    let server = Process::start_with_log(data.to_str().unwrap(), &options, "debug", log_file);
+    let made = client().put(format!("{}/v1/maps/a", server.http)).bearer_auth(operator.reveal());
+    assert_eq!(made.json(&json!({"resolution_m": 0.1})).send().await.unwrap().status(), StatusCode::CREATED);
+    // What needs no key is written with whose it is, too.
+    let alive = client().get(format!("{}/livez", server.http)).bearer_auth(operator.reveal());
+    assert_eq!(alive.send().await.unwrap().status(), StatusCode::OK);
+    assert_eq!(server.stop(), Some(0));
+    let text = fs::read_to_string(&log).unwrap();
+    let of_requests: Vec<&str> = text.lines().filter(|line| line.contains("request{")).collect();
+    assert!(of_requests.len() >= 3, "{text}");
+    for (line, name) in of_requests
+        .iter()
+        .flat_map(|line| ["key=", "protocol=", "peer=", "request_id="].map(|name| (line, name)))
+    {
+        assert_eq!(
+            line.matches(&format!(" {name}")).count() + line.matches(&format!("{{{name}")).count(),
+            1,
+            "{line}"
+        );
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn refused_keys_are_written_and_a_flood_of_them_is_counted() {
     let audited = Audited::start(&[]);

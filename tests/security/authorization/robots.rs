@@ -89,6 +89,38 @@ async fn scope_insert_undoes_scans_of_named_robots_and_deletes_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn scope_insert_carves_nothing_because_a_scan_says_so() {
+    let (server, [inserting, writing]) = Guarded::start_with(|keys| {
+        [("robots", Scope::Insert), ("tools", Scope::Write)]
+            .map(|(name, scope)| robots_key(keys, name, scope))
+    })
+    .await;
+    server.make_map("own").await;
+    let scan = |carve: Option<bool>, align: bool| {
+        let scan = json!({"robot": "r1", "points": POINTS, "guess": identity_json(), "align": align});
+        let mut scan = scan.as_object().unwrap().clone();
+        scan.extend(carve.map(|carve| ("carve".to_owned(), carve.into())));
+        Value::from(scan)
+    };
+    for align in [false, true] {
+        for (carve, key, expected) in [
+            (Some(true), &inserting, Some("scope_too_small")),
+            (Some(false), &inserting, None),
+            (None, &inserting, None),
+            (Some(true), &writing, None),
+        ] {
+            let told = http(&server, "scans", scan(carve, align), key).await;
+            assert_eq!(told.as_deref(), expected, "carve {carve:?}, align {align}");
+        }
+    }
+    let message = pb::InsertScanRequest { carve: Some(true), ..scan_pb("own", "r1", &POINTS) };
+    for operation in [Operation::InsertScan, Operation::InsertScanStream] {
+        let told = grpc(&server, operation, message.encode_to_vec(), &inserting).await;
+        assert_eq!(told.as_deref(), Some("scope_too_small"), "{operation:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn one_keys_request_ids_are_not_anothers() {
     let (server, [mallory, alice]) =
         Guarded::start_with(|keys| ["mallory", "alice"].map(|name| keys.add(name, Scope::Write, None))).await;

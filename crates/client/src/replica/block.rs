@@ -14,9 +14,11 @@ impl Replica {
     /// milliseconds and more: not for an async thread.
     ///
     /// # Errors
-    /// For a level that is none, a part that is not all in the region that is copied (of a dense block with what lies within
-    /// its cap), a block beyond the limits, and a dense block that is no box of finite sides.
+    /// Of a copy that is older than the options allow; for a level that is none, a part that is not all in the region that is
+    /// copied (of a dense block with what lies within its cap), a block beyond the limits, and a dense block that is no box of
+    /// finite sides.
     pub fn get_block(&self, request: &BlockRequest) -> Result<BlockAnswer, ReplicaError> {
+        self.shared.check_age(self.age_max)?;
         let Copied { map, map_uuid, .. } = self.shared.copied.read().clone();
         check_level(request.level, &map)?;
         self.check_cells(request.cells(map.lattice())?, map.lattice(), request.level)?;

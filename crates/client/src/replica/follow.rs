@@ -1,11 +1,12 @@
 //! How a replica follows its map.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use parking_lot::RwLock;
+use parking_lot::{Mutex, RwLock};
 use rand::RngExt;
 use tokio::sync::watch;
+use tonic::Code;
 
 use super::copy::{Applied, Builder};
 use super::error::ReplicaError;
@@ -21,6 +22,16 @@ use mrol_service::{WatchForm, WatchMessage, WatchRequest, WatchedSince};
 /// Shortest and longest pause before the server is asked again, less a random part of up to a half.
 const PAUSE: Duration = Duration::from_millis(100);
 const PAUSE_MAX: Duration = Duration::from_secs(5);
+
+/// How often in a row a server refuses a key before it is not asked again: it writes a line of its audit each time, and a
+/// key that was withdrawn comes back by no asking.
+const KEY_REFUSALS_MAX: u32 = 4;
+
+/// True where the server does not know the key, or does not let its holder watch the map.
+fn refuses_key(error: &ClientError) -> bool {
+    let codes = [Code::Unauthenticated, Code::PermissionDenied];
+    matches!(error, ClientError::Refused { code, .. } if codes.contains(code))
+}
 
 /// Follows a map.
 #[derive(Debug)]
@@ -93,24 +104,34 @@ impl Follower {
                     is_connected: true,
                     resets: 1,
                     last_error: None,
+                    has_ended: false,
                 };
                 let (copied, status) = (RwLock::new(copied), watch::Sender::new(status));
-                return Ok((Arc::new(Shared { copied, status }), watched));
+                let heard = Mutex::new(Instant::now());
+                return Ok((Arc::new(Shared { copied, status, heard }), watched));
             }
         }
     }
 
-    /// Follows the map for as long as it is not aborted.
+    /// Follows the map for as long as it is not aborted, and its key not refused again and again.
     pub(super) async fn run(mut self, shared: Arc<Shared>, mut watched: Answers<WatchMessage>) {
         loop {
             let error = self.follow(&shared, &mut watched).await;
+            let mut refusals = 0;
             watched = loop {
                 shared.tell(|status| status.is_connected = false);
                 shared.tell(|status| status.last_error.clone_from(&error));
                 self.take_a_break().await;
                 match self.watch().await {
                     Ok(watched) => break watched,
-                    Err(error) => shared.tell(|status| status.last_error = Some(error.to_string())),
+                    Err(error) => {
+                        refusals = if refuses_key(&error) { refusals + 1 } else { 0 };
+                        shared.tell(|status| status.last_error = Some(error.to_string()));
+                        if refusals >= KEY_REFUSALS_MAX {
+                            shared.tell(|status| status.has_ended = true);
+                            return;
+                        }
+                    }
                 }
             };
         }
@@ -126,6 +147,7 @@ impl Follower {
                 Ok(Some(Err(error))) => return Some(error.to_string()),
                 Ok(Some(Ok(message))) => message,
             };
+            shared.hear();
             let head_revision = message.head_revision;
             match self.apply(message).await {
                 Ok(applied) => {
@@ -149,5 +171,19 @@ impl Follower {
         let share = rand::rng().random_range(0.5..=1.0);
         tokio::time::sleep(self.pause.mul_f64(share)).await;
         self.pause = (2 * self.pause).min(PAUSE_MAX);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_that_is_refused_is_told_from_a_server_that_is_away() {
+        let refused =
+            |code| refuses_key(&ClientError::Refused { code, reason: None, message: String::new() });
+        assert!(refused(Code::Unauthenticated) && refused(Code::PermissionDenied));
+        assert!(![Code::Unavailable, Code::NotFound, Code::ResourceExhausted].into_iter().any(refused));
+        assert!(!refuses_key(&ClientError::Lost { url: String::new(), cause: String::new() }));
     }
 }

@@ -17,14 +17,16 @@ use mrol_service::{Reason, ServiceError};
 
 /// A copy of a map, or of a part of it, that follows the server's: it answers in this process, at a revision that it names.
 ///
-/// A task of the runtime that opened it follows the map until the replica is dropped. Where the connection breaks it comes
-/// back and goes on from the last revision, so that it misses nothing and tells nothing twice; meanwhile the copy answers as
-/// it is. A map that was deleted and made again is another one, by its uuid, and is copied anew.
+/// A task of the runtime that opened it follows the map until the replica is dropped. Where the connection breaks it comes back
+/// and goes on from the last revision, so that it misses nothing and tells nothing twice; meanwhile the copy answers as it is,
+/// up to the age that its options allow. Where the server refuses its key a few times in a row it follows no longer. A map that
+/// was deleted and made again is another one, by its uuid, and is copied anew.
 #[derive(Debug)]
 pub struct Replica {
     pub(super) shared: Arc<Shared>,
     pub(super) region: Option<Region>,
     pub(super) field_bytes_max: usize,
+    pub(super) age_max: Option<Duration>,
     following: JoinHandle<()>,
 }
 
@@ -43,7 +45,8 @@ impl Replica {
         let mut follower = Follower::new(client, map, options);
         let (shared, watched) = follower.copy_first().await?;
         let following = tokio::spawn(follower.run(Arc::clone(&shared), watched));
-        Ok(Self { shared, region: options.region, field_bytes_max: options.field_bytes_max, following })
+        let ReplicaOptions { region, field_bytes_max, age_max, .. } = options;
+        Ok(Self { shared, region, field_bytes_max, age_max, following })
     }
 
     /// How far the replica is.
@@ -54,6 +57,20 @@ impl Replica {
     /// Follows how far the replica is.
     pub fn statuses(&self) -> watch::Receiver<ReplicaStatus> {
         self.shared.status.subscribe()
+    }
+
+    /// How long ago the server was heard last: it tells something at least every `watch_heartbeat_s`, so that a copy of
+    /// more age may lack changes, however the status says it is connected.
+    pub fn age(&self) -> Duration {
+        self.shared.age()
+    }
+
+    /// Refuses a copy whose server was heard longer ago than `age_max`: for a question whose answer must not be older.
+    ///
+    /// # Errors
+    /// `Unavailable` with `replica_stale`.
+    pub fn check_age(&self, age_max: Duration) -> Result<(), ReplicaError> {
+        Ok(self.shared.check_age(Some(age_max))?)
     }
 
     /// Waits until the copy has `revision` of the map that it copies.

@@ -32,6 +32,9 @@ pub struct ReplicaOptions {
     pub viewpoint_bytes_max: usize,
     /// How long the server may be silent until the connection counts as lost: more than its `watch_heartbeat_s`. 35 s.
     pub silence_max: Duration,
+    /// How long ago the server may have been heard last for questions to be answered: more than its `watch_heartbeat_s`. Any
+    /// time without, which is the default: then whoever asks looks at [`Replica::age`](super::Replica::age).
+    pub age_max: Option<Duration>,
 }
 
 impl Default for ReplicaOptions {
@@ -44,6 +47,7 @@ impl Default for ReplicaOptions {
             field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
             viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             silence_max,
+            age_max: None,
         }
     }
 }

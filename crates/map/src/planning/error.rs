@@ -123,6 +123,36 @@ pub enum PlanningError {
         /// The motions' lengths; the first of them where they are many.
         lengths: Vec<usize>,
     },
+    /// A configuration of which a part lies beyond what the map can hold.
+    #[error(
+        "configurations[{configuration}].links[{link}] reaches beyond {min_m}..{end_m} m in an axis, with {around_m} m around it that count: no voxel can be there; is the unit meters?"
+    )]
+    BodyRange {
+        /// The configuration, among those of all motions.
+        configuration: usize,
+        /// The link.
+        link: usize,
+        /// What counts around it, meters: a clearance where unknown voxels count as occupied.
+        around_m: f64,
+        /// Smallest coordinate of the map, meters.
+        min_m: f64,
+        /// One past the largest, meters.
+        end_m: f64,
+    },
+    /// A sphere of which a part lies beyond what the map can hold.
+    #[error(
+        "spheres[{sphere}] reaches beyond {min_m}..{end_m} m in an axis, with {around_m} m around it that count: no voxel can be there; is the unit meters?"
+    )]
+    SphereRange {
+        /// The sphere, by its number among all of them.
+        sphere: usize,
+        /// What counts around it, meters: a clearance where unknown voxels count as occupied.
+        around_m: f64,
+        /// Smallest coordinate of the map, meters.
+        min_m: f64,
+        /// One past the largest, meters.
+        end_m: f64,
+    },
     /// A level that the map has not.
     #[error("level must lie in 0..={level_max}, got {level}")]
     Level {

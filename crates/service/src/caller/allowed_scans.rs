@@ -14,12 +14,15 @@ pub struct AllowedScans {
     pub robots: Option<Arc<BTreeSet<RobotName>>>,
     /// Whether changes may be undone whoever made them: scans named by the revision that they made.
     pub undo_of_others: bool,
+    /// Whether a scan may carve because it says so, where the settings of its robot do not: it takes out what others
+    /// mapped, and where it stands is the sender's word alone.
+    pub carving_on_request: bool,
 }
 
 impl Default for AllowedScans {
-    /// Scans of every robot, and every undo.
+    /// Scans of every robot, every undo, and carving.
     fn default() -> Self {
-        Self { robots: None, undo_of_others: true }
+        Self { robots: None, undo_of_others: true, carving_on_request: true }
     }
 }
 
@@ -35,6 +38,27 @@ impl AllowedScans {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Asks whether a scan of `robot` may say that it carves, where the settings of its robot say whether it does.
+    ///
+    /// # Errors
+    /// `PermissionDenied` with `scope_too_small` for a caller that may send scans alone.
+    pub fn permit_carving(
+        &self,
+        robot: &RobotName,
+        requested: Option<bool>,
+        by_settings: bool,
+    ) -> Result<(), ServiceError> {
+        if self.carving_on_request || by_settings || requested != Some(true) {
+            return Ok(());
+        }
+        let robot = robot.as_str();
+        let message = format!(
+            "carve takes scope write where the settings of robot {robot} do not carve, the key has insert: \
+             leave carve out, or let the operator set robots.{robot}.carve"
+        );
+        Err(ServiceError::new(Reason::ScopeTooSmall, message))
     }
 
     /// Asks whether `target` may be undone.
@@ -77,14 +101,34 @@ mod tests {
         let scan =
             |name| UndoTarget::Scan { robot: robot(name), session: SessionName::default(), scan_id: 1 };
         let since = |name| UndoTarget::RobotSince { robot: robot(name), revision: 1 };
-        let own = AllowedScans { robots: Some(Arc::new([robot("r1")].into())), undo_of_others: false };
+        let own = AllowedScans {
+            robots: Some(Arc::new([robot("r1")].into())),
+            undo_of_others: false,
+            carving_on_request: false,
+        };
         assert_eq!([reason(&own, scan("r1")), reason(&own, since("r1"))], [None, None]);
         for other in [scan("r2"), since("r2"), UndoTarget::Revision(1)] {
             assert_eq!(reason(&own, other), Some(Reason::RobotNotAllowed));
         }
-        let inserting = AllowedScans { robots: None, undo_of_others: false };
+        let inserting = AllowedScans { robots: None, undo_of_others: false, carving_on_request: false };
         assert_eq!(reason(&inserting, scan("r2")), None);
         assert_eq!(reason(&inserting, UndoTarget::Revision(1)), Some(Reason::ScopeTooSmall));
         assert_eq!(reason(&AllowedScans::default(), UndoTarget::Revision(1)), None);
+    }
+
+    #[test]
+    fn a_caller_that_sends_scans_alone_carves_where_the_settings_of_its_robot_say_so() {
+        let robot = RobotName::new("r1").unwrap();
+        let inserting = AllowedScans { carving_on_request: false, ..AllowedScans::default() };
+        let reason = |requested, by_settings| {
+            inserting.permit_carving(&robot, requested, by_settings).err().map(|error| error.reason)
+        };
+        assert_eq!(reason(Some(true), false), Some(Reason::ScopeTooSmall));
+        for (requested, by_settings) in
+            [(Some(true), true), (None, true), (None, false), (Some(false), false)]
+        {
+            assert_eq!(reason(requested, by_settings), None);
+        }
+        assert!(AllowedScans::default().permit_carving(&robot, Some(true), false).is_ok());
     }
 }

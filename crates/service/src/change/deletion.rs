@@ -45,13 +45,14 @@ impl MapService {
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             let (inner, deletion, caller) =
                 (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
+            let of = Arc::clone(&map);
             let submit = move |stop: StopSignal<'_>| {
                 let submit = |stop: StopSignal<'_>| {
                     map.submit_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
                 };
                 if reads_journal { limit.run(stop, submit) } else { submit(stop) }
             };
-            self.submit_and_wait(pool, None, submit).await
+            self.submit_and_wait(("DeleteVoxels", &of), pool, None, submit).await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| {
             Outcome::Changed(observer::Change::of_deletion(answer))

@@ -73,10 +73,11 @@ impl MapService {
         let request =
             request_id.map(|id| Request { id, digest: digest(&change), caller: self.caller.clone() });
         let (inner, record) = (Arc::clone(&self.inner), KeepOutRecord { change, request });
+        let of = Arc::clone(&map);
         let submit = move |_: StopSignal<'_>| {
             map.submit_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
         };
-        self.submit_and_wait(&self.inner.pools.mapping, None, submit).await
+        self.submit_and_wait(("ChangeKeepOut", &of), &self.inner.pools.mapping, None, submit).await
     }
 }
 

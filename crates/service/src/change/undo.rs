@@ -76,7 +76,8 @@ impl MapService {
             // A thread first: the robot's scans wait for this undo, and not for those of other maps.
             let thread = pool.thread().await?;
             let _robot = map.lock_robot_of(&undo.target).await;
-            self.submit_and_wait(pool, Some(thread), move |stop| {
+            let of = Arc::clone(&map);
+            self.submit_and_wait(("Undo", &of), pool, Some(thread), move |stop| {
                 limit.run(stop, |stop| map.submit_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
             })
             .await

@@ -119,7 +119,7 @@ reasons! {
         NothingThere "nothing_there" Both: "the search box lies away from the map", "correct it";
         PageTooLarge "page_too_large" Both: "`limit` is not 1 to `trajectory_page_max`", "ask for pages by `since_revision`";
         PointNotFinite "point_not_finite" Both: "NaN or infinity in a query, or in a `strict` scan", "remove the point";
-        PointOutOfRange "point_out_of_range" Both: "a point outside the map's range", "remove it; is the unit meters?";
+        PointOutOfRange "point_out_of_range" Both: "a point, a body, the end of a ray or a box outside the map's range: of what is there no voxel can tell", "remove it; is the unit meters?";
         ProbeBody "probe_body" Both: "the body of a health check exceeds `probe_body_bytes_max`", "send none";
         ScanOutOfRange "scan_out_of_range" Both: "no point of the scan lies within the map's range", "correct the pose";
         TimeLimitTooLong "time_limit_too_long" Both: "`time_limit_s` exceeds `localization_time_max_s`", "ask for less";
@@ -180,7 +180,7 @@ reasons! {
         SearchTooLarge "search_too_large" Both: "the map exceeds `localization_grid_bytes_max`", "give a `search_box`";
         TooManyKeepOuts "too_many_keep_outs" Both: "the map has `keep_outs_max` keep-outs", "delete one, or raise the limit";
         TooManyMaps "too_many_maps" Both: "the server has `maps_max` maps", "delete one, or raise the limit";
-        TooManyRobots "too_many_robots" Both: "the map has scans of `robots_per_map_max` robots", "use their names, or raise the limit";
+        TooManyRobots "too_many_robots" Both: "the map has scans of `robots_per_map_max` robots, or of `robots_per_caller_max` that the caller brought in", "use their names, undo all scans of one, or raise the limit";
     }
     DeadlineExceeded {
         BodyStalled "body_stalled" Both 408: "the body came too slowly (`body_silence_max_s`, `body_bytes_per_s_min`)", "send it faster";
@@ -198,6 +198,7 @@ reasons! {
         MapReadOnly "map_read_only" Both: "the map's journal failed; it answers queries and takes no changes", "mend the disk, restart the server";
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";
         OutcomeUnknown "outcome_unknown" Both: "the journal failed while this change was written: it may be there after the restart", "send the same `scan_id` or `request_id` again then";
+        ReplicaStale "replica_stale" Client: "the replica heard its server longer ago than `age_max` allows", "ask the server, or wait until the replica is connected";
         Starting "starting" Http: "maps are being opened", "wait; `/readyz` tells how far it is";
     }
     Internal {

@@ -65,7 +65,7 @@ pub(crate) fn from_file(
     };
     let decoded = Snapshot::decode_until(file, &bounds, &mut reserve, stop);
     let Snapshot { settings, contents, .. } = decoded.map_err(|refusal| not_read(refusal, stop))?;
-    let (robots, most) = (contents.trajectory.robots_known(), limits.robots_per_map_max);
+    let (robots, most) = (contents.trajectory.robots_with_scans(), limits.robots_per_map_max);
     if robots > most {
         let message = format!("the map file has scans of {robots} robots, robots_per_map_max is {most}");
         return Err(ServiceError::new(Reason::MapFull, message));

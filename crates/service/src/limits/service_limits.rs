@@ -63,6 +63,11 @@ pub struct Limits {
     pub health_watch_max_s: f64,
     /// Watches of maps at once, over both protocols. 256.
     pub watches_max: usize,
+    /// Watches of one caller at once: of a key, or of an address where there is none; 0 = any number. A quarter of
+    /// `watches_max`, so that nobody has them all. 64.
+    pub caller_watches_max: usize,
+    /// Streams of one caller at once, as `caller_watches_max`. Half of `streams_max`. 128.
+    pub caller_streams_max: usize,
     /// Longest time between two messages of a watch, where nothing changes. 10 s.
     pub watch_heartbeat_s: f64,
     /// How long a watch's client may take no message, until the watch ends. 30 s.
@@ -120,6 +125,9 @@ pub struct Limits {
     pub viewpoint_bytes_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
     pub robots_per_map_max: usize,
+    /// Robots with scans in a map that one caller brought in since the map was opened: the holder of a key, or an
+    /// address where there is none; 0 = any number. A quarter of `robots_per_map_max`. 1,024.
+    pub robots_per_caller_max: usize,
     /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
     pub jobs_waiting_max: usize,
     /// Bytes of a map file that is restored, before and after compression. 1 GiB.
@@ -181,6 +189,8 @@ impl Default for Limits {
             health_watches_max: 16,
             health_watch_max_s: 600.0,
             watches_max: 256,
+            caller_watches_max: 64,
+            caller_streams_max: 128,
             watch_heartbeat_s: 10.0,
             watch_unread_max_s: 30.0,
             events_per_map_max: 256,
@@ -207,6 +217,7 @@ impl Default for Limits {
             keep_out_corners_max: PRISM_CORNERS_MAX,
             viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             robots_per_map_max: 4_096,
+            robots_per_caller_max: 1_024,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
             map_file_scans_max: 20_000_000,

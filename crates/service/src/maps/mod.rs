@@ -12,6 +12,7 @@ mod full_state;
 mod hosted_map;
 mod keep_out_expiry;
 mod named;
+mod newcomers;
 mod opening;
 mod robots;
 mod saving;

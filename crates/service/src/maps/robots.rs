@@ -6,6 +6,7 @@ use std::sync::Arc;
 use tokio::sync::OwnedMutexGuard;
 
 use super::event_log::EventLog;
+use super::newcomers::Newcomers;
 use mrol_map::map::RobotName;
 use mrol_map::mapping::{LostRobots, Sightings};
 use mrol_map::sync::{Mutex, Rank};
@@ -24,6 +25,8 @@ pub(crate) struct Robots {
     pub(crate) lost: LostRobots,
     /// What became of the last scans that robots sent.
     pub(crate) events: EventLog,
+    /// Who brought which robots in.
+    pub(crate) newcomers: Newcomers,
 }
 
 impl Default for Robots {
@@ -33,6 +36,7 @@ impl Default for Robots {
             sightings: Sightings::default(),
             lost: LostRobots::default(),
             events: EventLog::default(),
+            newcomers: Newcomers::default(),
         }
     }
 }

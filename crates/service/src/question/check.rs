@@ -88,6 +88,10 @@ pub(super) fn check_ignored(regions: usize, limits: &Limits) -> Result<(), Servi
 
 impl From<PlanningError> for ServiceError {
     fn from(error: PlanningError) -> Self {
-        Self::new(Reason::BadCheck, error.to_string())
+        let reason = match error {
+            PlanningError::BodyRange { .. } | PlanningError::SphereRange { .. } => Reason::PointOutOfRange,
+            _ => Reason::BadCheck,
+        };
+        Self::new(reason, error.to_string())
     }
 }

@@ -107,6 +107,7 @@ impl From<FrontierError> for ServiceError {
                     format!("frontier_cells_max: {error}: ask for a smaller box or a coarser level");
                 Self::new(Reason::FrontierBoxTooLarge, message)
             }
+            FrontierError::Range { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),
             _ => Self::new(Reason::BadFrontiers, error.to_string()),
         }
     }

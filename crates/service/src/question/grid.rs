@@ -24,7 +24,7 @@ pub struct GridQuestion {
 pub struct GridScope {
     /// Which part of the map, seen from above.
     pub area: GridArea,
-    /// Lowest and highest height of voxels' centers, meters; infinite ones are fine.
+    /// Lowest and highest height, meters, between which voxels reach that count; infinite ones are fine.
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels. One voxel without.
     pub cell_m: Option<f64>,
@@ -106,6 +106,7 @@ impl From<GridError> for ServiceError {
                 let message = format!("grid_cells_max: {error}: ask for a smaller area or larger cells");
                 Self::new(Reason::GridTooLarge, message)
             }
+            GridError::BandRange { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),
             _ => Self::new(Reason::BadGrid, error.to_string()),
         }
     }

@@ -78,6 +78,9 @@ impl Question for NearestQuestion {
 
 impl From<NearestError> for ServiceError {
     fn from(error: NearestError) -> Self {
-        Self::new(Reason::BadRadius, error.to_string())
+        match error {
+            NearestError::Point(point) => point.into(),
+            NearestError::Radius { .. } => Self::new(Reason::BadRadius, error.to_string()),
+        }
     }
 }

@@ -116,6 +116,10 @@ impl Question for RayQuestion {
 
 impl From<RayError> for ServiceError {
     fn from(error: RayError) -> Self {
-        Self::new(Reason::BadRay, error.to_string())
+        let reason = match error {
+            RayError::EndRange { .. } | RayError::Leaves { .. } => Reason::PointOutOfRange,
+            _ => Reason::BadRay,
+        };
+        Self::new(reason, error.to_string())
     }
 }

@@ -7,7 +7,7 @@ use super::submit::{Effort, Judged};
 use crate::error::ServiceError;
 use crate::map_service::MapService;
 use crate::maps::HostedMap;
-use crate::observer::{JudgedScan, Outcome};
+use crate::observer::{Change, JudgedScan, Outcome};
 use crate::request::{ScanAnswer, ScanRequest};
 use crate::work::{Pools, TimeLimit};
 use mrol_map::map::MapName;
@@ -17,13 +17,16 @@ impl MapService {
     /// Aligns a scan and, where it fits, adds it.
     ///
     /// # Errors
-    /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
+    /// `PermissionDenied` for a robot that is not the caller's, and with `scope_too_small` for a caller that sends scans
+    /// alone and asks to carve; `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
     /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let robot = scan.robot.clone();
         let work = async {
             self.scans.permit(&scan.robot)?;
+            let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
+            self.scans.permit_carving(&scan.robot, scan.carve, by_settings)?;
             let (map, scan) = (self.map(map)?, Arc::new(scan));
             let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
             let judged = self.judge(&map, &scan).await;
@@ -42,6 +45,7 @@ impl MapService {
                 align_time: answer.align_time,
                 replayed: answer.replayed,
                 recovered: answer.recovered,
+                carved: Change::of_carving(answer),
             })
         })
         .await
@@ -59,10 +63,11 @@ impl MapService {
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
         let submit = |effort| {
             let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(map), Arc::clone(scan));
-            let (robot_lock, limit) = (Arc::clone(&robot_lock), limit.clone());
+            let (robot_lock, limit, asker) = (Arc::clone(&robot_lock), limit.clone(), self.asker.clone());
             move |stop: StopSignal<'_>| {
                 limit.run(stop, |stop| {
                     let robot_lock = Arc::clone(&robot_lock);
+                    map.check_robots_of(&asker, &scan.robot, &inner.settings.limits)?;
                     map.submit_scan(&scan, robot_lock, effort, &inner.settings, &inner.budget, stop)
                 })
             }
@@ -70,7 +75,9 @@ impl MapService {
         let Pools { mapping, long_mapping, .. } = &self.inner.pools;
         let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
         loop {
-            if let Some(judged) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
+            if let Some(judged) =
+                self.submit_and_wait(("InsertScan", map), pool, thread.take(), submit(effort)).await?
+            {
                 return Ok(judged);
             }
             (pool, effort) = (long_mapping, Effort::Whole);
@@ -96,5 +103,46 @@ impl MapService {
             self.inner.pools.alignment.run(align).await?
         };
         self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::error::Reason;
+    use crate::limits::Limits;
+    use crate::map_service::MapService;
+    use crate::request::{PointCloud, ScanRequest};
+    use crate::settings::ServiceSettings;
+    use crate::work::Asker;
+    use mrol_map::geometry::{Point, Pose};
+    use mrol_map::map::{MapName, MapSettings, RobotName};
+    use mrol_map::mapping::Guess;
+    use mrol_store::OpeningProgress;
+
+    #[tokio::test]
+    async fn one_caller_brings_in_its_share_of_robots_and_others_have_room() {
+        let limits = Limits { robots_per_caller_max: 2, ..Limits::default() };
+        let settings = ServiceSettings { limits, ..ServiceSettings::default() };
+        let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+        let map = MapName::new("a").unwrap();
+        service.create_map(map.clone(), MapSettings::new(0.1, 1)).await.unwrap();
+        let send = async |asker: &str, robot: &str| {
+            let points = PointCloud::from(vec![Point::new(1.0, 2.0, 0.5)]);
+            let mut scan = ScanRequest::new(RobotName::new(robot).unwrap(), points);
+            (scan.guess, scan.at_guess) = (Guess::Pose(Pose::identity()), true);
+            let caller = service.clone().asked_by(Asker::with_key(asker));
+            caller.insert_scan(&map, scan).await.map(|answer| answer.accepted).map_err(|error| error.reason)
+        };
+        for (asker, robot, told) in [
+            ("one", "r1", Ok(true)),
+            ("one", "r2", Ok(true)),
+            ("one", "r3", Err(Reason::TooManyRobots)),
+            ("one", "r1", Ok(true)),
+            ("other", "r3", Ok(true)),
+            // It has scans there by now, whoever sent them.
+            ("one", "r3", Ok(true)),
+        ] {
+            assert_eq!(send(asker, robot).await, told, "{robot} of {asker}");
+        }
     }
 }

@@ -11,6 +11,7 @@ use crate::map_service::MapService;
 use crate::maps::HostedMap;
 use crate::observer::Outcome;
 use crate::request::{MapVersion, TrajectoryAnswer, TrajectoryQuery};
+use crate::work::Asker;
 use mrol_map::map::{MapName, RobotName, Trajectory};
 use mrol_map::util::StopSignal;
 
@@ -146,17 +147,40 @@ fn page(
 }
 
 impl HostedMap {
-    /// Refuses a robot that the map does not know where it knows as many as it may.
+    /// Refuses a robot that is new to the map where `asker` brought as many into it as one caller may.
+    pub(super) fn check_robots_of(
+        &self,
+        asker: &Asker,
+        robot: &RobotName,
+        limits: &Limits,
+    ) -> Result<(), ServiceError> {
+        let (trajectory, most) = (self.map.trajectory(), limits.robots_per_caller_max);
+        if most == 0 || trajectory.has_scans_of(robot) {
+            return Ok(());
+        }
+        let has_scans = |robot: &RobotName| trajectory.has_scans_of(robot);
+        if self.robots.newcomers.admit(asker, robot, most, has_scans) {
+            return Ok(());
+        }
+        let message = format!(
+            "map {} has scans of {most} robots that {asker} brought in, robots_per_caller_max is {most}: robot {robot} \
+             is one more; use one of their names, undo all scans of one, or raise the limit",
+            self.name
+        );
+        Err(ServiceError::new(Reason::TooManyRobots, message))
+    }
+
+    /// Refuses a robot that has no scans in the map where as many have as may.
     pub(super) fn check_robots(&self, robot: &RobotName, limits: &Limits) -> Result<(), ServiceError> {
         let (trajectory, most) = (self.map.trajectory(), limits.robots_per_map_max);
-        if trajectory.knows(robot) || trajectory.robots_known() < most {
+        if trajectory.has_scans_of(robot) || trajectory.robots_with_scans() < most {
             return Ok(());
         }
         let message = format!(
             "map {} has scans of {} robots, robots_per_map_max is {most}: robot {robot} is one more; use one of their \
-             names, or raise the limit",
+             names, undo all scans of one, or raise the limit",
             self.name,
-            trajectory.robots_known()
+            trajectory.robots_with_scans()
         );
         Err(ServiceError::new(Reason::TooManyRobots, message))
     }

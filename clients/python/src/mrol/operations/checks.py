@@ -89,7 +89,7 @@ class CheckOperations(MapHandle):
         `clearance_max_m` (64 voxels at most). Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With
         `unknown="occupied"` voxels are met that no scan saw through.
 
-        Raises `InvalidArgument` (`bad_check`, `batch_too_large`), naming which.
+        Raises `InvalidArgument` (`bad_check`, `batch_too_large`, `point_out_of_range`), naming which.
         """
         arrays = Arrays()
         checked = Body.of(body)

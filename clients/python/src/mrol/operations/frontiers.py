@@ -66,7 +66,8 @@ class FrontierOperations(MapHandle):
 
         `box` is a `Box`, or its two corners, shape (2, 3). `standoff_m` is how far from a frontier its view is (20 voxels).
 
-        Raises `ResourceExhausted` (`frontier_box_too_large`: take a coarser level), `InvalidArgument` (`bad_frontiers`).
+        Raises `ResourceExhausted` (`frontier_box_too_large`: take a coarser level), `InvalidArgument` (`bad_frontiers`,
+        `point_out_of_range`).
         """
         min_m, max_m = Box.of(box).corners()
         head = {

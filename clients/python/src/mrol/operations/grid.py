@@ -55,12 +55,12 @@ class GridOperations(MapHandle):
         min_revision: int | None = None,
         map_uuid: str | None = None,
     ) -> Grid:
-        """The map from above: a cell is occupied where a voxel in it has its center between `min_z_m` and `max_z_m`.
+        """The map from above: a cell is occupied where a voxel in it reaches between `min_z_m` and `max_z_m`.
 
         `area` has shape (2, 2): the smallest x y, then the largest; all of the map without it. `cell_m` is a whole number of voxels
         of the level. With `tell_unknown` cells that scans saw through are told from those that nobody saw.
 
-        Raises `ResourceExhausted` (`grid_too_large`), `InvalidArgument` (`bad_grid`).
+        Raises `ResourceExhausted` (`grid_too_large`), `InvalidArgument` (`bad_grid`, `point_out_of_range`).
         """
         head = {
             "area": None if area is None else _area(area),

@@ -49,7 +49,7 @@ class NearestOperations(MapHandle):
 
         `points` has shape (..., 3), meters, in the map frame. Distances are to the cubes of voxels, or to their centers.
 
-        Raises `InvalidArgument` (`bad_radius`, `point_not_finite`).
+        Raises `InvalidArgument` (`bad_radius`, `point_not_finite`, `point_out_of_range`).
         """
         arrays = Arrays()
         rows, shape = rows_of(points, 3, "points", POINTS, self._request_bytes_max)

@@ -48,7 +48,7 @@ class RayOperations(MapHandle):
         `directions` or `ends` have shape (..., 3); `origins` the same, or (3,) for all rays. Map frame, meters. With
         `unknown="occupied"` a ray ends where no scan saw through.
 
-        Raises `InvalidArgument` (`bad_ray`), naming which.
+        Raises `InvalidArgument` (`bad_ray`, `point_out_of_range`), naming which.
         """
         if (directions is None) == (ends is None):
             raise ArgumentError("directions", "both or neither of directions and ends", "the only one of them")

@@ -16,6 +16,10 @@ impl Keyed for MappedScan {
     }
 }
 
+/// Robots whose scans were all undone and whose scan ids are remembered all the same, at most: so that one who undoes what
+/// it sent under ever new names neither fills the memory nor takes these names from others.
+pub(super) const NAMES_WITHOUT_SCANS_MAX: usize = 1024;
+
 /// The accepted scans of all robots, in the order of their revisions. A clone takes no time.
 #[derive(Debug, Clone, Default)]
 pub struct Trajectory {
@@ -121,7 +125,17 @@ impl Trajectory {
         self.robots.contains_key(robot)
     }
 
-    /// How many robots have scans here, or have had.
+    /// True of a robot with an accepted scan that was not undone.
+    pub fn has_scans_of(&self, robot: &RobotName) -> bool {
+        self.robots.get(robot).is_some_and(|robot| !robot.revisions.is_empty())
+    }
+
+    /// How many robots have accepted scans that were not undone.
+    pub fn robots_with_scans(&self) -> usize {
+        self.robots.values().filter(|robot| !robot.revisions.is_empty()).count()
+    }
+
+    /// How many robots have scans here, or have had and are remembered.
     pub fn robots_known(&self) -> usize {
         self.robots.len()
     }
@@ -254,6 +268,24 @@ impl Trajectory {
             if robot.is_unknown() {
                 robots.remove(&name);
             }
+        }
+        self.forget_names();
+    }
+
+    /// Forgets the names of robots whose scans were all undone, and with them the ids of these scans, beyond
+    /// [`NAMES_WITHOUT_SCANS_MAX`]: those that were used least recently.
+    fn forget_names(&mut self) {
+        let without = self.robots.iter().filter(|(_, robot)| robot.revisions.is_empty());
+        let mut without: Vec<_> =
+            without.map(|(name, robot)| (robot.last_revision(), name.clone())).collect();
+        let Some(beyond) = without.len().checked_sub(NAMES_WITHOUT_SCANS_MAX).filter(|beyond| *beyond > 0)
+        else {
+            return;
+        };
+        without.sort_unstable();
+        let robots = Arc::make_mut(&mut self.robots);
+        for (_, name) in &without[..beyond] {
+            robots.remove(name);
         }
     }
 

@@ -138,6 +138,11 @@ impl RobotScans {
         revisions
     }
 
+    /// The last revision that a scan of a session made, as far as that is known.
+    pub(super) fn last_revision(&self) -> u64 {
+        self.sessions.values().map(|session| session.last_revision).max().unwrap_or_default()
+    }
+
     /// True of a robot of whom nothing is known.
     pub(super) fn is_unknown(&self) -> bool {
         self.revisions.is_empty() && self.sessions.is_empty() && self.closed.as_slice().is_empty()

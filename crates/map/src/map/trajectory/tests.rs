@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use proptest::prelude::*;
 
+use super::map_trajectory::NAMES_WITHOUT_SCANS_MAX;
 use super::*;
 use crate::geometry::Pose;
 use crate::map::name::{RobotName, SessionName};
@@ -189,6 +190,25 @@ fn the_id_of_an_undone_scan_stays_known_and_may_be_that_of_a_later_one_in_old_jo
     assert_eq!(known(&trajectory), Some(("kept", 3)));
     trajectory.thin(3, &TrajectorySpacing::default());
     assert_eq!(known(&trajectory), Some(("kept", 3)));
+}
+
+#[test]
+fn names_whose_scans_were_all_undone_are_free_again_and_remembered_in_a_bounded_number() {
+    let name = |n: u64| RobotName::new(&format!("r{n}")).unwrap();
+    let of = |n: u64, revision: u64| {
+        let pose = MappedScan::new(name(n), Pose::identity());
+        MappedScan { revision, scan_id: Some(7), ..pose }
+    };
+    let most = NAMES_WITHOUT_SCANS_MAX as u64;
+    let count = most + 100;
+    let mut trajectory: Trajectory = (1..=count).map(|n| of(n, n)).collect();
+    assert_eq!(trajectory.robots_with_scans() as u64, count);
+    trajectory.withdraw(1..=count - 1, count + 1);
+    assert_eq!((trajectory.robots_with_scans(), trajectory.robots_known() as u64), (1, most + 1));
+    assert!(trajectory.has_scans_of(&name(count)) && !trajectory.has_scans_of(&name(count - 1)));
+    // Those that were used last are remembered with their ids, and that of the scan that is in force.
+    let known = |n| trajectory.known(&name(n), &SessionName::default(), 7).is_some();
+    assert_eq!([1, 99, 100, count - 1, count].map(known), [false, false, true, true, true]);
 }
 
 #[test]

@@ -140,6 +140,12 @@ impl LinkInCells {
         Self::of_parts(balls, &[], |sphere| SpherePlace::InGroups(before + sphere), cells_per_m)
     }
 
+    /// True of a link without a sphere or a point.
+    #[inline(always)]
+    pub(super) fn is_nowhere(&self) -> bool {
+        self.spheres == 0 && self.points.is_empty()
+    }
+
     /// Each sphere eight times.
     fn singles(&self) -> Vec<Group> {
         let single = |sphere: usize| {

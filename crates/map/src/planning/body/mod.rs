@@ -9,6 +9,7 @@ mod path;
 mod placed;
 mod placement;
 mod prepared;
+mod reach;
 
 pub use body_of_links::Body;
 pub(super) use configurations::MAP_FRAME;
@@ -20,3 +21,4 @@ pub use parts::{Link, Sphere};
 pub(super) use path::LinkMotion;
 pub use placed::PlacedPart;
 pub(super) use placement::{CellsFromLink, EightTransforms, LinkPose};
+pub(super) use reach::Reach;

@@ -12,7 +12,7 @@ use super::found_spheres::OpenSpheres;
 use super::link::{self, LinkState};
 use super::rounds::Answerer;
 use crate::planning::body::{
-    Body, BodyInCells, CellsFromLink, Configurations, LinkMotion, LinkPose, RADIUS_MAX_M,
+    Body, BodyInCells, CellsFromLink, Configurations, LinkMotion, LinkPose, RADIUS_MAX_M, Reach,
 };
 use crate::planning::effort::Effort;
 use crate::planning::error::PlanningError;
@@ -85,7 +85,8 @@ impl PlanningView<'_> {
     ///
     /// # Errors
     /// For a level that the map has not, spheres that are too large for it, lengths that do not sum up to the
-    /// configurations or are below two, and a step or clearance out of range.
+    /// configurations or are below two, a step or clearance out of range, and a motion that leads beyond the map's
+    /// lattice.
     pub fn check_motions(
         &self,
         question: &MotionQuestion<'_>,
@@ -93,7 +94,9 @@ impl PlanningView<'_> {
     ) -> Result<Option<Vec<MotionAnswer>>, PlanningError> {
         let cells_per_m = self.cells_per_m(question.level)?;
         let body = question.body.in_cells(cells_per_m)?;
-        let motions = question.motions(&body, cells_per_m)?;
+        let most_m = question.clearance_max_m.unwrap_or(0.0);
+        let reach = Reach::of(self.lattice(), cells_per_m, question.surroundings, most_m);
+        let motions = question.motions(&body, cells_per_m, &reach)?;
         let chunks = (motions.len(), PER_STOP_CHECK);
         let MotionQuestion { level, surroundings, .. } = *question;
         let answers = self.each(level, surroundings, chunks, stop, Motions(&motions));
@@ -140,6 +143,7 @@ impl MotionQuestion<'_> {
         &self,
         body: &'b BodyInCells,
         cells_per_m: f64,
+        reach: &Reach,
     ) -> Result<Vec<BodyMotion<'b>>, PlanningError> {
         self.configurations.check_links(body.links.len())?;
         self.check_lengths()?;
@@ -150,7 +154,10 @@ impl MotionQuestion<'_> {
         let motion = |(number, &length): (usize, &u32)| {
             let (start, end) = (first, first + length as usize - 1);
             first = end + 1;
-            let segments = (start..end).map(|from| self.segment(body, number, from, step_m));
+            let segments = (start..end).map(|from| {
+                reach.check_motion(body, &self.configurations, from)?;
+                self.segment(body, number, from, step_m)
+            });
             let segments = segments.collect::<Result<Vec<_>, _>>()?;
             Ok(BodyMotion { body, segments, cells_per_m, clearances })
         };

@@ -9,7 +9,7 @@ use super::pipeline::{Unanswered, answer_staged};
 use super::rounds::Answerer;
 use super::single_link::EightPlaces;
 use crate::planning::answers::{Clearance, Hit};
-use crate::planning::body::{Body, BodyInCells, Configurations};
+use crate::planning::body::{Body, BodyInCells, Configurations, Reach};
 use crate::planning::clearance::LANES;
 use crate::planning::error::PlanningError;
 use crate::planning::keep_outs::{Figure, Posed, Shapes};
@@ -38,13 +38,14 @@ impl PlanningView<'_> {
     /// once stopped.
     ///
     /// # Errors
-    /// For a level that the map has not, and spheres that are too large for the level.
+    /// For a level that the map has not, spheres that are too large for the level, and a part of the body beyond the
+    /// map's lattice.
     pub fn bodies_meet(
         &self,
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<u64>>, PlanningError> {
-        let (body, cells_per_m) = self.in_cells(question)?;
+        let (body, cells_per_m) = self.in_cells(question, 0.0)?;
         let PoseQuestion { configurations, level, surroundings, .. } = *question;
         let meeting = Meeting { configurations, body: &body, cells_per_m };
         let meets = self.each(level, surroundings, (configurations.len(), PER_STOP_CHECK), stop, meeting);
@@ -61,7 +62,7 @@ impl PlanningView<'_> {
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
-        let hits = self.each_configuration(question, stop, FirstHits)?;
+        let hits = self.each_configuration(question, stop, (FirstHits, 0.0))?;
         Ok(self.among_keep_outs_at(question, hits, |posed, shapes, hits| posed.hits(shapes, hits, stop)))
     }
 
@@ -77,7 +78,7 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Clearance>>, PlanningError> {
         let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
-        let clearances = self.each_configuration(question, stop, clearances)?;
+        let clearances = self.each_configuration(question, stop, (clearances, most_m))?;
         Ok(self.among_keep_outs_at(question, clearances, |posed, shapes, clearances| {
             posed.clearances(shapes, clearances, stop)
         }))
@@ -95,23 +96,28 @@ impl PlanningView<'_> {
         mend(Posed::Body(&figure, question.configurations), &shapes, answers?)
     }
 
-    /// The body in cells of the level, and how many of them are a meter.
+    /// The body in cells of the level, and how many of them are a meter, for an answer about what is within `most_m` of
+    /// the body.
     fn in_cells<'q>(
         &self,
         question: &PoseQuestion<'q>,
+        most_m: f32,
     ) -> Result<(Cow<'q, BodyInCells>, f64), PlanningError> {
         let cells_per_m = self.cells_per_m(question.level)?;
         question.configurations.check_links(question.body.links().len())?;
-        Ok((question.body.in_cells(cells_per_m)?, cells_per_m))
+        let body = question.body.in_cells(cells_per_m)?;
+        Reach::of(self.lattice(), cells_per_m, question.surroundings, most_m)
+            .check_poses(&body, &question.configurations)?;
+        Ok((body, cells_per_m))
     }
 
     fn each_configuration<K: AnswerKind>(
         &self,
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
-        kind: K,
+        (kind, most_m): (K, f32),
     ) -> Result<Option<Vec<K::Answer>>, PlanningError> {
-        let (body, cells_per_m) = self.in_cells(question)?;
+        let (body, cells_per_m) = self.in_cells(question, most_m)?;
         let PoseQuestion { configurations, level, surroundings, .. } = *question;
         let chunks = (configurations.len(), PER_STOP_CHECK);
         let poses = Poses { configurations, kind, configuration: Configuration::new(&body, cells_per_m) };

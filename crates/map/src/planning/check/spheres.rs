@@ -6,7 +6,7 @@ use super::field_lookup::FieldLookup;
 use super::poses::words;
 use super::rounds::Answerer;
 use crate::planning::answers::{Clearance, Hit};
-use crate::planning::body::{BodyInCells, LinkInCells, MAP_FRAME, RADIUS_MAX_M, Sphere};
+use crate::planning::body::{BodyInCells, LinkInCells, MAP_FRAME, RADIUS_MAX_M, Reach, Sphere};
 use crate::planning::error::{PlanningError, SpherePlace};
 use crate::planning::keep_outs::{Posed, Shapes, Solid};
 use crate::planning::planner::PlanningView;
@@ -63,13 +63,14 @@ impl PlanningView<'_> {
     /// stopped.
     ///
     /// # Errors
-    /// For a level that the map has not, a padding out of range, and spheres that are too large for the level.
+    /// For a level that the map has not, a padding out of range, and spheres that are too large for the level or reach
+    /// beyond the map's lattice.
     pub fn spheres_meet(
         &self,
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<u64>>, PlanningError> {
-        let words = self.each_group(question, stop, Meets)?.map(|meets| words(&meets));
+        let words = self.each_group(question, stop, (Meets, 0.0))?.map(|meets| words(&meets));
         Ok(self.among_keep_outs(question, words, |posed, shapes, words| posed.mark(shapes, words, stop)))
     }
 
@@ -82,7 +83,7 @@ impl PlanningView<'_> {
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
-        let hits = self.each_group(question, stop, FirstHits)?;
+        let hits = self.each_group(question, stop, (FirstHits, 0.0))?;
         Ok(self.among_keep_outs(question, hits, |posed, shapes, hits| posed.hits(shapes, hits, stop)))
     }
 
@@ -97,7 +98,7 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Clearance>>, PlanningError> {
         let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
-        let clearances = self.each_group(question, stop, clearances)?;
+        let clearances = self.each_group(question, stop, (clearances, most_m))?;
         Ok(self.among_keep_outs(question, clearances, |posed, shapes, clearances| {
             posed.clearances(shapes, clearances, stop)
         }))
@@ -119,11 +120,13 @@ impl PlanningView<'_> {
         &self,
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
-        kind: K,
+        (kind, most_m): (K, f32),
     ) -> Result<Option<Vec<K::Answer>>, PlanningError> {
         let SphereQuestion { groups, padding_m, level, surroundings } = *question;
         let cells_per_m = self.cells_per_m(level)?;
         check_padding(padding_m)?;
+        let reach = Reach::of(self.lattice(), cells_per_m, surroundings, most_m);
+        reach.check_spheres(groups.spheres, padding_m)?;
         let mut before = 0;
         let mut in_cells = |spheres: &[Sphere]| {
             let link = LinkInCells::of_spheres(spheres, padding_m, before, cells_per_m)?;

@@ -6,8 +6,8 @@ use super::request::{FrontierError, FrontierRequest, STANDOFF_VOXELS, STANDOFF_V
 use super::view_pose::Lookout;
 use super::window::{self, Window};
 use crate::map::MapView;
-use crate::planning::grid::band_of;
 use crate::util::StopSignal;
+use crate::voxel::{INDEX_MAX, INDEX_MIN, Lattice};
 
 /// Most voxels of a box, whatever the request says: their places and those around are numbers of 32 bits.
 const CELLS_MAX: usize = u32::MAX as usize / 32;
@@ -60,8 +60,14 @@ fn ranges(view: &MapView<'_>, request: &FrontierRequest) -> Result<[[i32; 2]; 3]
     if !is_box {
         return Err(FrontierError::Corners(min_m, max_m));
     }
+    let (low_m, end_m) = view.lattice().range_m();
+    for (field, value) in [("min_m", min_m), ("max_m", max_m)] {
+        if !value.iter().all(|c| (low_m..=end_m).contains(c)) {
+            return Err(FrontierError::Range { field, value, min_m: low_m, end_m });
+        }
+    }
     let ranges: [[i32; 2]; 3] = std::array::from_fn(|axis| {
-        window::within_lattice(band_of(view.lattice(), level, [min_m[axis], max_m[axis]]), level)
+        window::within_lattice(indices_in(view.lattice(), level, [min_m[axis], max_m[axis]]), level)
     });
     let cells =
         ranges.iter().map(|[first, last]| (f64::from(*last) - f64::from(*first) + 1.0).max(0.0)).product();
@@ -70,6 +76,19 @@ fn ranges(view: &MapView<'_>, request: &FrontierRequest) -> Result<[[i32; 2]; 3]
         return Err(FrontierError::Cells { cells, level, most });
     }
     Ok(ranges)
+}
+
+/// The lowest and the highest index of voxels of `level` whose centers lie in a range; in the wrong order where there
+/// are none.
+fn indices_in(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32; 2] {
+    let voxel_m = lattice.resolution_m(level);
+    // The voxel that holds the border, from which its center is half a voxel away at most.
+    let around = |c: f64| (c / voxel_m).floor().clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32;
+    let center_m = |i: i32| (f64::from(i) + 0.5) * voxel_m;
+    let (low, high) = (around(low_m), around(high_m));
+    let first = (low - 1..=low + 1).find(|&i| center_m(i) >= low_m).unwrap_or(low + 1);
+    let last = (high - 1..=high + 1).rev().find(|&i| center_m(i) <= high_m).unwrap_or(high - 1);
+    [first, last]
 }
 
 fn standoff_m(view: &MapView<'_>, request: &FrontierRequest) -> Result<f64, FrontierError> {

@@ -33,6 +33,18 @@ pub enum FrontierError {
     /// Corners that are not finite or in the wrong order.
     #[error("box: min_m must be finite and not exceed max_m, got {0:?} and {1:?}")]
     Corners([f64; 3], [f64; 3]),
+    /// A corner that no map of this resolution reaches.
+    #[error("box: {field} must lie within {min_m}..{end_m} m in each axis, as the map does, got {value:?}")]
+    Range {
+        /// The corner.
+        field: &'static str,
+        /// The corner, meters.
+        value: [f64; 3],
+        /// Smallest coordinate of the map, meters.
+        min_m: f64,
+        /// The largest.
+        end_m: f64,
+    },
     /// Too many voxels.
     #[error("box: {cells} voxels of level {level}, at most {most} are looked at")]
     Cells {

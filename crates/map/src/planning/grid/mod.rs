@@ -1,4 +1,5 @@
-//! The map from above: which cells of a grid in x y have a voxel within a band of height, and how high it reaches.
+//! The map from above: which cells of a grid in x y have a voxel that reaches into a band of height, and how
+//! high it reaches.
 
 mod cells;
 mod free;
@@ -13,5 +14,4 @@ mod tests;
 
 pub use occupancy_grid::Grid;
 pub use project::project_grid;
-pub(super) use projection::band_of;
 pub use request::{GridArea, GridError, GridRequest};

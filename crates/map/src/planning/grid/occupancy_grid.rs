@@ -13,7 +13,8 @@ pub struct Grid {
     pub size: [usize; 2],
     /// Whether cell i has a voxel or a keep-out: bit i % 64 of `occupied[i / 64]`.
     pub occupied: Vec<u64>,
-    /// Height of the top of the highest voxel of each cell that lies in the band, meters; NaN for a cell without one.
+    /// Height of the top of the highest voxel of each cell that reaches into the band, meters, which may lie above it by
+    /// less than a voxel; NaN for a cell without one.
     pub tops_m: Vec<f32>,
     /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was
     /// not, the grid does not tell what was seen.

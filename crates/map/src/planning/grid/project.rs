@@ -12,8 +12,9 @@ use crate::util::StopSignal;
 /// Which cells of a grid have occupied voxels of a level in a band of height, and how high these reach.
 ///
 /// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each
-/// voxel lies in one cell. Voxels of the band are those whose centers lie in it, as those of a
-/// [`Region`](crate::map::Region) are.
+/// voxel lies in one cell. Voxels of the band are those that reach into it: that have more than a border in common with
+/// it, however little, and of a band that is thinner than a voxel those that hold it. So no obstacle is passed over
+/// because the center of its voxel lies above or below, at whatever level.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
 /// too; they have no top, and make no grid larger that is as large as what is there.

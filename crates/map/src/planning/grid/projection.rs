@@ -15,8 +15,7 @@ pub(super) struct Projection<'a> {
     /// Voxels along a cell's side.
     pub(super) cell_voxels: i64,
     pub(super) cell_m: f64,
-    band_m: [f64; 2],
-    /// Lowest and highest index of voxels in the band.
+    /// Lowest and highest index of the voxels that reach into the band.
     pub(super) band: [i32; 2],
 }
 
@@ -35,27 +34,31 @@ impl<'a> Projection<'a> {
         if !is_in_order {
             return Err(GridError::Band(band_m));
         }
+        let (min_m, end_m) = view.lattice().range_m();
+        if band_m[1] < min_m || band_m[0] >= end_m {
+            return Err(GridError::BandRange { band_m, min_m, end_m });
+        }
         let voxel_m = view.lattice().resolution_m(level);
         let cell_voxels =
             whole(cell_m / voxel_m).filter(|voxels| (1.0..=f64::from(INDEX_MAX)).contains(voxels));
         let cell_voxels = cell_voxels.ok_or(GridError::Cell { cell_m, voxel_m })?;
-        let band = band_of(view.lattice(), level, band_m);
+        let band = band_of(voxel_m, band_m);
         Ok(Self {
             view,
             level,
             voxel_m,
             cell_voxels: cell_voxels as i64,
             cell_m: cell_voxels * voxel_m,
-            band_m,
             band,
         })
     }
 
     /// The smallest rectangle with all cells that have a voxel in the band.
     pub(super) fn occupied_cells(&self, stop: StopSignal<'_>) -> Cells {
+        let [low_m, high_m] = self.heights_m();
         let everywhere = Region::Box {
-            min_m: [f64::NEG_INFINITY, f64::NEG_INFINITY, self.band_m[0]],
-            max_m: [f64::INFINITY, f64::INFINITY, self.band_m[1]],
+            min_m: [f64::NEG_INFINITY, f64::NEG_INFINITY, low_m],
+            max_m: [f64::INFINITY, f64::INFINITY, high_m],
         };
         let mut cells: Option<Cells> = None;
         self.for_each_voxel(&everywhere, stop, |cell, _| {
@@ -72,7 +75,7 @@ impl<'a> Projection<'a> {
         let size = [0, 1].map(|axis| cells.size(axis) as usize);
         let count = size[0] * size[1];
         let (mut occupied, mut tops_m) = (vec![0u64; count.div_ceil(64)], vec![f32::NAN; count]);
-        self.for_each_voxel(&cells.region(self.cell_m, self.band_m), stop, |cell, z| {
+        self.for_each_voxel(&cells.region(self.cell_m, self.heights_m()), stop, |cell, z| {
             if let Some(number) = cells.number(cell) {
                 occupied[number / 64] |= 1 << (number % 64);
                 // The larger of the two, NaN passed over.
@@ -87,6 +90,12 @@ impl<'a> Projection<'a> {
             tops_m,
             free: None,
         }
+    }
+
+    /// Where the voxels of the band begin and end, meters: what holds their centers, however thin the band.
+    fn heights_m(&self) -> [f64; 2] {
+        let [first, last] = self.band.map(f64::from);
+        [first * self.voxel_m, (last + 1.0) * self.voxel_m]
     }
 
     /// Calls `f` with the cell and the height's index of each voxel of the band in the blocks that meet `region`.
@@ -106,17 +115,13 @@ impl<'a> Projection<'a> {
     }
 }
 
-/// The lowest and the highest index of voxels of `level` whose centers lie in a band; in the wrong order where there
-/// are none.
-pub(in crate::planning) fn band_of(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32; 2] {
-    let voxel_m = lattice.resolution_m(level);
-    // The voxel that holds the border, from which its center is half a voxel away at most.
-    let around = |c: f64| (c / voxel_m).floor().clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32;
-    let center_m = |i: i32| (f64::from(i) + 0.5) * voxel_m;
-    let (low, high) = (around(low_m), around(high_m));
-    let first = (low - 1..=low + 1).find(|&i| center_m(i) >= low_m).unwrap_or(low + 1);
-    let last = (high - 1..=high + 1).rev().find(|&i| center_m(i) <= high_m).unwrap_or(high - 1);
-    [first, last]
+/// The lowest and the highest index of voxels that have more than a border in common with a band, in voxels of side
+/// `voxel_m`; of a band without height, or whose ends lie in one voxel, that voxel. Never in the wrong order.
+fn band_of(voxel_m: f64, band_m: [f64; 2]) -> [i32; 2] {
+    let [low, high] = band_m.map(|c| (c / voxel_m).clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)));
+    let first = whole(low).unwrap_or_else(|| low.floor()) as i32;
+    let end = whole(high).unwrap_or_else(|| high.ceil()) as i32;
+    [first, (end - 1).max(first)]
 }
 
 /// Refuses a corner out of the range of a map.

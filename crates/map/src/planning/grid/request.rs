@@ -7,8 +7,8 @@ pub struct GridRequest {
     pub level: u32,
     /// Which part of the map, seen from above.
     pub area: GridArea,
-    /// Lowest and highest height, meters: voxels count whose centers lie between them or on them. Infinite ones are
-    /// fine.
+    /// Lowest and highest height, meters: voxels count that reach between them, by more than a border; where the two
+    /// are the same, the voxel there. Infinite ones are fine.
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels.
     pub cell_m: f64,
@@ -54,6 +54,16 @@ pub enum GridError {
     /// A band with NaN or in the wrong order.
     #[error("min_z_m must be at most max_z_m, got {} and {}", .0[0], .0[1])]
     Band([f64; 2]),
+    /// A band in which no map of this resolution can have a voxel.
+    #[error("min_z_m and max_z_m must have a height of {min_m}..{end_m} m between them, as the map has, got {} and {}", .band_m[0], .band_m[1])]
+    BandRange {
+        /// The band, meters.
+        band_m: [f64; 2],
+        /// The smallest coordinate of the map, meters.
+        min_m: f64,
+        /// One past the largest.
+        end_m: f64,
+    },
     /// A cell that is no whole number of voxels.
     #[error("cell_m must be a whole number of voxels of {voxel_m} m, got {cell_m}")]
     Cell {

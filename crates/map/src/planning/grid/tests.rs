@@ -25,13 +25,19 @@ const REQUEST: GridRequest = GridRequest {
     cells_max: 1000,
 };
 
+/// True where a voxel with its center at height `z` has more than a border in common with a band, or holds its low end.
+fn reaches_into([low, high]: [f64; 2], z: f64, voxel_m: f64) -> bool {
+    let (bottom, top, near) = (z - voxel_m / 2.0, z + voxel_m / 2.0, 1e-6 * voxel_m);
+    top > low + near && (bottom < high - near || bottom <= low + near)
+}
+
 /// The height of the highest voxel of each cell that has one, by the cell's index.
 fn tops_of_all(map: &MultiResolutionMap, request: &GridRequest) -> BTreeMap<[i64; 2], f32> {
     let (view, voxel_m) = (map.view(), map.lattice().resolution_m(request.level));
     let mut tops = BTreeMap::new();
     for voxel in view.lists(request.level).flat_map(|list| list.iter()) {
         let [x, y, z] = map.lattice().center_m(voxel, request.level);
-        if z >= request.band_m[0] && z <= request.band_m[1] {
+        if reaches_into(request.band_m, z, voxel_m) {
             let cell = [x, y].map(|c| (c / request.cell_m).floor() as i64);
             let top = tops.entry(cell).or_insert(f32::NEG_INFINITY);
             *top = top.max((f64::from(voxel.index()[2] + 1) * voxel_m) as f32);
@@ -62,6 +68,9 @@ proptest! {
             Just([f64::NEG_INFINITY, f64::INFINITY]),
             (-20.0f64..20.0, 0.0f64..10.0).prop_map(|(low, height)| [low, low + height]),
             (-30i32..30, 0i32..9).prop_map(|(low, height)| [low, low + height].map(|i| (f64::from(i) + 0.5) * RESOLUTION_M)),
+            // Borders of voxels, and bands without height.
+            (-30i32..30, 0i32..9).prop_map(|(low, height)| [low, low + height].map(|i| f64::from(i) * RESOLUTION_M)),
+            (-20.0f64..20.0).prop_map(|at| [at, at]),
         ],
     ) {
         let map = history.map();
@@ -116,7 +125,7 @@ proptest! {
             let column_is_free = |x: i32, y: i32| (-far..far).any(|z| {
                 let voxel = VoxelKey::new([first[0] + cell[0] + x, first[1] + cell[1] + y, z]).unwrap();
                 let height = seen.map.lattice().center_m(voxel, level)[2];
-                height >= band_m[0] && height <= band_m[1] && seen.is_free(&view, voxel, level)
+                reaches_into(band_m, height, voxel_m) && seen.is_free(&view, voxel, level)
             });
             let side = 0..cell_voxels as i32;
             let all = side.clone().all(|y| side.clone().all(|x| column_is_free(x, y)));
@@ -125,6 +134,31 @@ proptest! {
             prop_assert_eq!(grid.is_unknown(number), !is_free && !grid.is_occupied(number));
         }
     }
+}
+
+#[test]
+fn a_wall_is_drawn_in_a_band_that_holds_no_center_of_a_voxel() {
+    let wall: Vec<[i32; 3]> = (0..12).flat_map(|y| (0..20).map(move |z| [3, y, z])).collect();
+    let map = map_of(&wall, 0.1);
+    // Levels of 0.1, 0.2 and 0.4 m, with heights that lie between two rows of centers, on a border, and on one center.
+    for (level, band_m) in [
+        (0, [0.16, 0.24]),
+        (0, [0.5, 0.5]),
+        (0, [0.55, 0.55]),
+        (0, [0.51, 0.52]),
+        (1, [0.11, 0.29]),
+        (2, [0.25, 0.55]),
+        (2, [0.05, 0.15]),
+    ] {
+        let cell_m = map.lattice().resolution_m(level);
+        let grid = project(&map, &GridRequest { level, band_m, cell_m, ..REQUEST }).unwrap();
+        let occupied = (0..grid.cells()).filter(|&number| grid.is_occupied(number)).count();
+        assert_eq!(occupied, 12 >> level, "level {level}, band {band_m:?}");
+    }
+    // What only touches the band from below or above does not count: a floor does not where the band begins on it.
+    let on_the_wall = project(&map, &GridRequest { band_m: [2.0, 3.0], ..REQUEST }).unwrap();
+    let below_it = project(&map, &GridRequest { band_m: [-1.0, 0.0], ..REQUEST }).unwrap();
+    assert_eq!((on_the_wall.cells(), below_it.cells()), (0, 0));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::request::{NearestError, NearestRequest, RADIUS_VOXELS_MAX};
 use super::search::Search;
 use crate::map::MapView;
 use crate::planning::keep_outs::Shapes;
+use crate::planning::unknown::OutOfRange;
 use crate::util::StopSignal;
 use crate::voxel::Cluster;
 
@@ -23,7 +24,7 @@ const POINTS_PER_STOP_CHECK: usize = 64;
 /// The view must cover the whole map. Takes 24 bytes a point. Once stopped, the answer has fewer points.
 ///
 /// # Errors
-/// When the radius is out of range.
+/// When the radius is out of range, and for the first point that lies in no voxel.
 pub fn find_nearest(
     view: &MapView<'_>,
     request: &NearestRequest<'_>,
@@ -34,6 +35,7 @@ pub fn find_nearest(
     if !(radius_m > 0.0 && radius_m <= max_m) {
         return Err(NearestError::Radius { radius_m, max_m, level });
     }
+    OutOfRange::check(points, view.lattice())?;
     let nothing = Cluster::default();
     let mut search = Search::new(view.tier_view(level), &nothing, radius_m, to);
     let mut nearest = NearestVoxels::of_capacity(points.len());

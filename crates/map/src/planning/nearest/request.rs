@@ -1,6 +1,7 @@
 //! The request: points, how far to look, and what distances are measured to.
 
 use crate::geometry::Point;
+use crate::planning::unknown::OutOfRange;
 use crate::util::Keyword;
 
 /// Largest radius of a search, voxels of the level that is asked.
@@ -30,7 +31,7 @@ impl Keyword for MeasuredTo {
 /// Points of the map frame, and how far from them to look.
 #[derive(Debug, Clone, Copy)]
 pub struct NearestRequest<'a> {
-    /// The points, meters. One that is not finite has no voxel near.
+    /// The points, meters, in the range of the map's lattice.
     pub points: &'a [Point],
     /// Level of the voxels.
     pub level: u32,
@@ -43,6 +44,9 @@ pub struct NearestRequest<'a> {
 /// Why the nearest voxels cannot be found.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NearestError {
+    /// A point in no voxel of the map's lattice.
+    #[error(transparent)]
+    Point(#[from] OutOfRange),
     /// A radius that is no number above 0, or too large.
     #[error(
         "radius_m must lie above 0 and at most {max_m} m, {RADIUS_VOXELS_MAX} voxels of level {level}, got {radius_m}"

@@ -103,7 +103,7 @@ fn of_voxels_equally_far_the_smallest_key_is_taken() {
 }
 
 #[test]
-fn a_radius_beyond_its_limits_is_named_and_a_point_that_is_none_has_nothing_near() {
+fn a_radius_beyond_its_limits_and_a_point_beyond_the_lattice_are_named() {
     let map = map_of(&[[0; 3]]);
     for radius_m in [0.0, -1.0, f64::NAN, 64.001, f64::INFINITY] {
         let request = NearestRequest { points: &[], level: 0, radius_m, to: MeasuredTo::Cubes };
@@ -111,6 +111,9 @@ fn a_radius_beyond_its_limits_is_named_and_a_point_that_is_none_has_nothing_near
         assert!(said.starts_with("radius_m must lie above 0 and at most 64 m"), "{said}");
     }
     for bad in [[f32::NAN, 0.0, 0.0], [f32::INFINITY, 0.0, 0.0], [f32::MAX, 0.0, 0.0], [0.0, f32::MIN, 0.0]] {
-        assert_eq!(nearest(&map, bad, 64.0, MeasuredTo::Cubes), None);
+        let points = [Point::from([0.0; 3]), bad.into()];
+        let request = NearestRequest { points: &points, level: 0, radius_m: 64.0, to: MeasuredTo::Cubes };
+        let said = find_nearest(&map.view(), &request, StopSignal::NEVER).unwrap_err().to_string();
+        assert!(said.starts_with("points[1] must be finite and lie in"), "{said}");
     }
 }

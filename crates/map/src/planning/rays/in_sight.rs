@@ -25,7 +25,9 @@ pub(super) fn walk(
     let effort = Effort::until(stop);
     for number in 0..request.rays.len() {
         let (ray, range_m) = request.ray(number)?;
-        let Some(mut walk) = space.walk(number, ray, range_m) else { continue };
+        let Some(mut walk) = space.walk(number, ray, range_m) else {
+            return Err(leaves(request, number, 0.0));
+        };
         loop {
             effort.spend(VOXEL_EFFORT);
             if effort.is_stopped() {
@@ -37,11 +39,20 @@ pub(super) fn walk(
                     hits.set(number, distance_m, voxel);
                     break;
                 }
+                Step::Missed if walk.end_m() < range_m => {
+                    return Err(leaves(request, number, walk.end_m()));
+                }
                 Step::Missed => break,
             }
         }
     }
     Ok(())
+}
+
+/// A ray that left the lattice so far from its origin.
+fn leaves(request: &Request<'_>, at: usize, left_m: f64) -> RayError {
+    let (min_m, end_m) = request.range_m;
+    RayError::Leaves { at, left_m, min_m, end_m }
 }
 
 /// How far a line runs through free voxels of `level` alone and outside of the view's keep-outs, up to `most_m` meters.

@@ -1,7 +1,7 @@
 //! The rays of a request in cells of a level.
 
 use super::ray::Ray;
-use super::request::{RayError, Rays};
+use super::request::{RayError, Rays, Toward};
 
 /// Rays that were asked for, as those of a lattice of cells.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +38,12 @@ impl Request<'_> {
             return Err(RayError::Origin { at, origin, min_m, end_m });
         }
         let (direction, length_m) = toward.from(number, origin)?;
+        if let Toward::Ends(ends) = toward {
+            let end = ends[number];
+            if !end.xyz().iter().all(|c| (min_m..end_m).contains(&f64::from(*c))) {
+                return Err(RayError::EndRange { at: number, end, min_m, end_m });
+            }
+        }
         Ok((Ray::new(origin_m.map(|c| c / self.cell_m), direction, self.cell_m), length_m))
     }
 }

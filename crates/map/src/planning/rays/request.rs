@@ -21,10 +21,11 @@ pub enum Toward<'a> {
     Directions {
         /// A direction for each ray: of length 1 within [`DIRECTION_LENGTH_TOLERANCE`], and normalized.
         directions: &'a [Point],
-        /// Length of each ray, meters, above 0; infinite for rays that end with the map.
+        /// Length of each ray, meters, above 0; infinite for rays that end with the map. Where unknown voxels are met,
+        /// a ray may not leave the map's lattice with nothing met.
         range_m: f64,
     },
-    /// To points: one for each ray, meters, which is where the ray ends.
+    /// To points: one for each ray, meters, in the range of the map's lattice, which is where the ray ends.
     Ends(&'a [Point]),
 }
 
@@ -65,6 +66,32 @@ pub enum RayError {
         direction: Point,
         /// Its length.
         length: f64,
+    },
+    /// An end that is in no voxel of the map's lattice.
+    #[error("ends[{at}] must lie in {min_m}..{end_m} m in each axis, got {end:?}")]
+    EndRange {
+        /// Which ray.
+        at: usize,
+        /// The end.
+        end: Point,
+        /// Smallest coordinate, meters.
+        min_m: f64,
+        /// One past the largest coordinate, meters.
+        end_m: f64,
+    },
+    /// A ray that leaves the map's lattice with nothing met, where unknown voxels are met.
+    #[error(
+        "directions[{at}] leads out of {min_m}..{end_m} m with nothing met, {left_m} m from its origin: what is beyond is unknown, take a shorter range_m"
+    )]
+    Leaves {
+        /// Which ray.
+        at: usize,
+        /// How far from its origin it leaves the lattice, meters.
+        left_m: f64,
+        /// Smallest coordinate, meters.
+        min_m: f64,
+        /// One past the largest coordinate, meters.
+        end_m: f64,
     },
     /// An end that is not finite, or where the ray begins.
     #[error("ends[{at}] must be finite and apart from its origin {origin:?}, got {end:?}")]

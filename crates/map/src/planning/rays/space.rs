@@ -44,6 +44,11 @@ impl Walk {
     pub(super) fn at_m(&self) -> f64 {
         self.place.at_m
     }
+
+    /// Where it ends, or leaves the space, meters.
+    pub(super) fn end_m(&self) -> f64 {
+        self.end_m
+    }
 }
 
 impl<'a> Space<'a> {

@@ -1,6 +1,7 @@
 //! Planners' answers against brute force over all voxels, by the one definition of when a ball meets a cube; through
 //! changes of the map, at all levels.
 
+mod beyond_lattice;
 mod brute_force;
 mod examples;
 mod in_sight;

@@ -4,7 +4,7 @@ use super::free_space::FreeSpace;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapView};
 use crate::util::{Keyword, StopSignal};
-use crate::voxel::VoxelKey;
+use crate::voxel::{Lattice, VoxelKey};
 
 /// Points between two checks of the stop signal. A multiple of the bits in a word.
 const POINTS_PER_STOP_CHECK: usize = 4096;
@@ -57,6 +57,23 @@ pub struct OutOfRange {
     pub min_m: f64,
     /// One past the largest, meters.
     pub end_m: f64,
+}
+
+impl OutOfRange {
+    /// Refuses points of which one lies in no voxel of a lattice.
+    ///
+    /// # Errors
+    /// For the first such point.
+    pub(in crate::planning) fn check(points: &[Point], lattice: &Lattice) -> Result<(), Self> {
+        let from_map = lattice.from_map();
+        let at = points.iter().position(|&point| from_map.index(point).is_none());
+        at.map_or(Ok(()), |at| Err(Self::of(points, at, lattice)))
+    }
+
+    fn of(points: &[Point], at: usize, lattice: &Lattice) -> Self {
+        let (min_m, end_m) = lattice.range_m();
+        Self { at, point: points[at], min_m, end_m }
+    }
 }
 
 impl PointStates {
@@ -118,13 +135,7 @@ pub fn classify_points(
     {
         if !view.query(some, &from_map, level, Lookup::Exact, occupied) {
             let at = some.iter().position(|&point| from_map.index(point).is_none()).unwrap_or_default();
-            let (min_m, end_m) = view.lattice().range_m();
-            return Err(OutOfRange {
-                at: looked_up * POINTS_PER_STOP_CHECK + at,
-                point: some[at],
-                min_m,
-                end_m,
-            });
+            return Err(OutOfRange::of(points, looked_up * POINTS_PER_STOP_CHECK + at, view.lattice()));
         }
         if let Some(keep_outs) = view.keep_outs() {
             keep_outs.mark(some, &Pose::identity(), occupied, stop);
