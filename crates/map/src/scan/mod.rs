@@ -9,6 +9,6 @@ mod tum;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
-pub use reader::{ReadError, parse_points, read_points, scan_files};
+pub use reader::{ReadError, parse_points, read_exact_points, read_points, scan_files};
 pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
 pub use writer::{write_f32, write_ply};
