@@ -23,7 +23,7 @@ use mrol_map::align::Method;
 use mrol_map::geometry::Pose;
 use mrol_map::map::{RobotName, SessionName};
 use mrol_map::mapping::Guess;
-use mrol_map::scan::{PointFilter, read_points, scan_files};
+use mrol_map::scan::{PointFilter, SkippedPoints, read_points, scan_files};
 use mrol_service::{ScanAnswer, ScanRequest};
 
 /// Scans read ahead of the one that is being sent.
@@ -318,7 +318,12 @@ impl Display for ScanLine {
             JsonScan { verdict: "accepted", carved_voxels, .. } => {
                 write!(f, "  {} carved", count(*carved_voxels))
             }
-            JsonScan { reason, .. } => write!(f, "  {reason}"),
+            JsonScan { reason, .. } => return write!(f, "  {reason}"),
+        }?;
+        match &self.answer {
+            JsonScan { reason, .. } if SkippedPoints::is_told_in(reason) => write!(f, "  {reason}"),
+            JsonScan { points_skipped: 0, .. } => Ok(()),
+            JsonScan { points_skipped, .. } => write!(f, "  {} points skipped", count(*points_skipped)),
         }
     }
 }

@@ -19,7 +19,7 @@ use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapSettings};
-use mrol_map::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
+use mrol_map::scan::{PointFilter, SkippedPoints, StampedPose, read_points, scan_files, write_trajectory};
 use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
@@ -83,6 +83,9 @@ pub(crate) struct Map {
     alignment: AlignmentOptions,
     #[command(flatten)]
     points: PointOptions,
+    /// Take points at exactly 0 0 0 as any other [default: they are skipped, as drivers write them where nothing returned]
+    #[arg(long)]
+    keep_zeros: bool,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
     #[arg(long, value_parser = parse::keyword::<Lookup>())]
     lookup: Option<Lookup>,
@@ -105,6 +108,7 @@ impl Map {
         let mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
         let mut mapper = mapper.recovering(!self.no_recovery);
         let filter = self.points.filter().map_err(CliError::usage)?;
+        let filter = PointFilter { keep_zeros: self.keep_zeros, ..filter };
         let files = scan_files(&self.scans)?;
         let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
         self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
@@ -113,9 +117,9 @@ impl Map {
         let output = output.with_bar(files.len());
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
-            let points = usable_points(file, &filter)?;
+            let (points, skipped) = usable_points(file, &filter)?;
             let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
-            output.print(&run.note(k, file, &mapped))?;
+            output.print(&run.note(k, file, &mapped, skipped))?;
             output.step();
         }
         output.clear_bar();
@@ -196,7 +200,7 @@ impl Run {
     }
 
     /// Records the result of scan `k`; returns its line.
-    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped) -> ScanLine {
+    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped, skipped: SkippedPoints) -> ScanLine {
         self.scans += 1;
         self.false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
         let map_from_sensor = mapped.alignment.map_from_sensor;
@@ -205,7 +209,8 @@ impl Run {
             self.trajectory.push(StampedPose { id: k as f64, map_from_sensor });
         }
         let error = self.truth.as_mut().filter(|_| accepted).map(|truth| truth.add(k, &map_from_sensor));
-        ScanLine::of(name_of(file), mapped, error, self.name_width)
+        let skipped = SkippedPoints { beyond_map: mapped.beyond_map, ..skipped };
+        ScanLine::of(name_of(file), mapped, &skipped, error, self.name_width)
     }
 
     fn summary(&self, mapper: &Mapper) -> Summary {
@@ -223,23 +228,22 @@ impl Run {
     }
 }
 
-/// Reads the points of a scan that are finite and pass the filter.
-fn usable_points(file: &Path, filter: &PointFilter) -> Result<Vec<Point>, CliError> {
+/// Reads the points of a scan that pass the filter, and counts those that do not.
+fn usable_points(file: &Path, filter: &PointFilter) -> Result<(Vec<Point>, SkippedPoints), CliError> {
     let mut points = read_points(file)?;
-    let all = points.len();
-    points.retain(|point| point.is_finite());
-    let finite = points.len();
+    let skipped = SkippedPoints::of(&points, filter);
     points.retain(|&point| filter.keeps(point));
-    match (all, finite, points.len()) {
-        (0, ..) => Err(in_file(file, "no point in this file")),
-        (_, 0, _) => {
-            Err(in_file(file, format!("none of its {all} points is finite: nothing but no-returns")))
-        }
-        (.., 0) => {
-            let problem = format!("none of its {finite} points passes --range-min, --range-max and --body");
-            Err(in_file(file, problem))
-        }
-        _ => Ok(points),
+    match (skipped.points, points.is_empty()) {
+        (0, _) => Err(in_file(file, "no point in this file")),
+        (all, true) if skipped.not_finite + skipped.zeros == all => Err(in_file(
+            file,
+            format!("none of its {all} points is a return ({skipped}); --keep-zeros keeps those at 0 0 0"),
+        )),
+        (_, true) => Err(in_file(
+            file,
+            format!("none of its points passes --range-min, --range-max and --body ({skipped})"),
+        )),
+        _ => Ok((points, skipped)),
     }
 }
 
