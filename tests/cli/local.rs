@@ -38,7 +38,7 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
         }
         assert!(line["reason"].as_str().is_some_and(|reason| !reason.is_empty()));
         assert_eq!(line["information"].as_array().unwrap().len(), 6);
-        assert_eq!(line["points_skipped"], 0);
+        assert!(line["points_skipped"].is_u64());
         assert_eq!(line.as_object().unwrap().len(), 15);
     }
     let added: u64 = lines.iter().map(|line| line["new_voxels"].as_u64().unwrap()).sum();
