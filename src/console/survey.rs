@@ -98,7 +98,7 @@ impl Survey {
     }
 
     /// The pose in the survey of a scan that was found in the map: what [`Survey::to_map`] makes undone.
-    pub fn from_map(&self, map_from_scan: &Pose) -> Pose {
+    pub fn to_survey(&self, map_from_scan: &Pose) -> Pose {
         Translation3::from(self.origin) * map_from_scan * Translation3::from(-self.shift)
     }
 }
@@ -164,7 +164,7 @@ mod tests {
             Pose::from_parts(Translation3::identity(), UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3));
         let pose = turned * Translation3::new(-388_090.0, -3_948_990.0, 0.0);
         assert!(error_m(&survey, &pose, [0.0; 3]) < 1e-5);
-        let found = survey.from_map(&survey.to_map(&pose));
+        let found = survey.to_survey(&survey.to_map(&pose));
         assert!((found.translation.vector - pose.translation.vector).norm() < 1e-6);
     }
 

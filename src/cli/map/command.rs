@@ -236,7 +236,7 @@ impl Run {
         let map_from_sensor = mapped.alignment.map_from_sensor;
         let accepted = mapped.accepted();
         if accepted {
-            let map_from_sensor = self.survey.from_map(&map_from_sensor);
+            let map_from_sensor = self.survey.to_survey(&map_from_sensor);
             self.trajectory.push(StampedPose { id: k as f64, map_from_sensor });
         }
         let error = self.truth.as_mut().filter(|_| accepted).map(|truth| truth.add(k, &map_from_sensor));

@@ -80,7 +80,7 @@ impl PointTimes {
     ///
     /// # Errors
     /// When the time of a point that counts is not finite, or farther from the timestamp than `most_s` seconds.
-    pub(crate) fn from_timestamp(
+    pub(crate) fn relative_to_timestamp(
         &self,
         counts: impl Fn(usize) -> bool,
         most_s: f64,
@@ -114,7 +114,7 @@ mod tests {
     fn times_from_the_beginning_of_a_sweep_end_at_its_timestamp() {
         let bytes: Vec<u8> = [0.0f32, 0.05, 0.1].iter().flat_map(|time| time.to_le_bytes()).collect();
         let times = PointTimes::from_bytes(&bytes, TimeReference::SweepStart).unwrap();
-        let from_timestamp = times.from_timestamp(|_| true, 1.0).unwrap();
+        let from_timestamp = times.relative_to_timestamp(|_| true, 1.0).unwrap();
         assert_eq!(from_timestamp.as_slice(), [-0.1, -0.05, 0.0]);
         assert_eq!(PointTimes::from_bytes(&times.to_bytes(), TimeReference::SweepStart), Ok(times));
     }
@@ -123,12 +123,13 @@ mod tests {
     fn times_of_points_that_do_not_count_may_be_anything() {
         for wrong in [f32::NAN, f32::INFINITY, f32::MAX, -4e9, 4_294.967] {
             let sweep = PointTimes::new(&[0.0, wrong, 0.1, 0.05], TimeReference::SweepStart);
-            let times = sweep.from_timestamp(|i| i != 1, 1.0).unwrap();
+            let times = sweep.relative_to_timestamp(|i| i != 1, 1.0).unwrap();
             assert_eq!([0, 2, 3].map(|i| times.as_slice()[i]), [-0.1, 0.0, -0.05]);
             assert!(times.as_slice()[1].is_nan());
-            assert!(sweep.from_timestamp(|_| true, 1.0).is_err());
+            assert!(sweep.relative_to_timestamp(|_| true, 1.0).is_err());
         }
-        let none = PointTimes::new(&[f32::NAN], TimeReference::SweepStart).from_timestamp(|_| false, 1.0);
+        let none =
+            PointTimes::new(&[f32::NAN], TimeReference::SweepStart).relative_to_timestamp(|_| false, 1.0);
         assert!(none.unwrap().as_slice()[0].is_nan());
     }
 
@@ -136,8 +137,9 @@ mod tests {
     fn what_is_no_time_is_named_with_its_place_and_the_limit() {
         let refused = |times: &[f32], timestamp| {
             let times = PointTimes::new(times, TimeReference::Timestamp);
-            let refused =
-                times.check(2, timestamp).and_then(|()| times.from_timestamp(|_| true, 1.0).map(|_| ()));
+            let refused = times
+                .check(2, timestamp)
+                .and_then(|()| times.relative_to_timestamp(|_| true, 1.0).map(|_| ()));
             refused.unwrap_err().message
         };
         assert!(refused(&[0.0], Some(1)).contains("each of 2 points, got 1"));

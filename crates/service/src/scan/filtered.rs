@@ -28,8 +28,11 @@ impl<'a> FilteredScan<'a> {
         let filter = request.filter.or(settings.of_robot(&request.robot).filter);
         let (points, most_s) = (request.points.as_slice(), settings.limits.point_times_max_s);
         let counts = |i: usize| filter.keeps(points[i]);
-        let times =
-            request.point_times.as_ref().map(|times| times.from_timestamp(counts, most_s)).transpose()?;
+        let times = request
+            .point_times
+            .as_ref()
+            .map(|times| times.relative_to_timestamp(counts, most_s))
+            .transpose()?;
         let ends = RayEnds { points, times_s: times.as_ref().map(PointTimes::as_slice) };
         let filtered = FilteredPoints::of(ends, filter, &request.robot, request.strict)?;
         let digest = digest(request, times.as_ref());

@@ -6,17 +6,7 @@
 
 mod ascii;
 mod binary;
+mod file;
 mod header;
 
-use super::coordinates::Coordinates;
-use super::error::Problem;
-use header::{DataKind, Header};
-
-/// The points of a `.pcd` file. Its viewpoint is ignored: the pose of a scan is given with the scan.
-pub(super) fn points<C: Coordinates>(bytes: &[u8]) -> Result<Vec<C>, Problem> {
-    let (header, data) = Header::take(bytes)?;
-    match header.data {
-        DataKind::Ascii => ascii::points(&header, data),
-        DataKind::Binary | DataKind::BinaryCompressed => binary::points(&header, data.rest()),
-    }
-}
+pub(super) use file::points;

@@ -5,22 +5,8 @@
 
 mod ascii;
 mod binary;
+mod file;
 mod header;
 mod vertex;
 
-use ply_rs_bw::ply::Encoding;
-
-use super::coordinates::Coordinates;
-use super::error::Problem;
-use header::Header;
-use vertex::Vertex;
-
-/// The points of a `.ply` file.
-pub(super) fn points<C: Coordinates>(bytes: &[u8]) -> Result<Vec<C>, Problem> {
-    let (header, payload) = Header::take(bytes)?;
-    let vertex = Vertex::of(&header)?;
-    match header.encoding {
-        Encoding::Ascii => ascii::points(&header, &vertex, payload),
-        _ => binary::points(&header, &vertex, payload.rest()),
-    }
-}
+pub(super) use file::points;
