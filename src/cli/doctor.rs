@@ -11,7 +11,7 @@ use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::{bytes, count};
 use mrol_map::map::MapName;
-use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
+use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, diagnose_file, set_aside};
 use mrol_store::{DataDir, StoreSettings};
 
 const EXAMPLES: &str = "\
@@ -62,10 +62,14 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
     for path in data_dir.set_aside()? {
         output.note(format!("set aside, and read by nobody: {}", path.display()));
     }
-    let output = output.with_bar_of(names.len(), "maps");
+    // Both a file and a folder may have a map's name: the next start refuses the file then.
+    let files = data_dir.file_names()?;
+    let maps = names.into_iter().map(|name| (name, false)).chain(files.into_iter().map(|name| (name, true)));
+    let maps: Vec<(MapName, bool)> = maps.collect();
+    let output = output.with_bar_of(maps.len(), "maps");
     let mut problems = 0;
-    for name in names {
-        let diagnosis = diagnose(data_dir, &name)?;
+    for (name, is_file) in maps {
+        let diagnosis = if is_file { diagnose_file(data_dir, &name)? } else { diagnose(data_dir, &name)? };
         problems += diagnosis.problems.len();
         output.print(&Report::of(&name, diagnosis))?;
         output.step();

@@ -17,17 +17,21 @@ use mrol::console::Output;
 use mrol::console::count;
 use mrol::console::parse;
 use mrol::console::true_poses;
+use mrol::console::{OriginChoice, Survey};
 use mrol::json::JsonScan;
-use mrol_client::{Client, ClientError, new_session};
+use mrol_client::{Client, ClientError, NewMap, new_session};
 use mrol_map::align::Method;
 use mrol_map::geometry::Pose;
-use mrol_map::map::{RobotName, SessionName};
+use mrol_map::map::{MapOrigin, RobotName, SessionName};
 use mrol_map::mapping::Guess;
-use mrol_map::scan::{PointFilter, read_points, scan_files};
+use mrol_map::scan::{PointFilter, SkippedPoints, read_exact_points, scan_files};
 use mrol_service::{ScanAnswer, ScanRequest};
 
 /// Scans read ahead of the one that is being sent.
 const SCANS_AHEAD: usize = 2;
+
+/// Side of the voxels of a map that does not tell, meters: points that f32 rounds by more than 1/16 of it are refused.
+const RESOLUTION_UNKNOWN_M: f64 = 0.1;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -84,6 +88,10 @@ pub(super) struct Insert {
     /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none
     #[arg(long, value_name = "NAME", requires = "first_scan_id", value_parser = parse::session_name)]
     session: Option<SessionName>,
+    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or, with
+    /// --create, the first point. It is subtracted from them in double precision
+    #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
+    origin: Option<OriginChoice>,
     /// Make the map first
     #[arg(long, requires = "resolution")]
     create: bool,
@@ -102,13 +110,14 @@ impl Insert {
         let files = scan_files(&self.scans)?;
         let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
         let client = self.map.server.connect().await?;
-        self.create_map(&client).await?;
+        let survey = self.survey(&client, &files, &output).await?;
 
         let (sender, scans) = mpsc::channel(SCANS_AHEAD);
         let plan = Plan {
             robot: self.robot.clone(),
-            first: self.first_guess(),
-            poses,
+            survey,
+            first: self.first_guess(&survey),
+            poses: poses.map(|poses| poses.iter().map(|pose| survey.to_map(pose)).collect()),
             session: match self.first_scan_id {
                 Some(_) => self.session.clone().unwrap_or_default(),
                 None => new_session(),
@@ -140,15 +149,44 @@ impl Insert {
         }
     }
 
-    async fn create_map(&self, client: &Client) -> Result<(), CliError> {
-        if let Some(resolution_m) = self.resolution {
-            client.create_map(&self.map.name, self.settings.with_resolution(resolution_m)).await?;
+    /// How the scans lie to the map, which is made first where that is wanted.
+    async fn survey(&self, client: &Client, files: &[PathBuf], output: &Output) -> Result<Survey, CliError> {
+        let name = &self.map.name;
+        // Who may only insert is not told, and neither is anybody of a map that is not there.
+        let there = client.map_info(name).await.ok().map(|info| info.settings);
+        let first =
+            files.first().map(|file| read_exact_points(file).map(|points| (file, points))).transpose()?;
+        let origin = match (self.origin, &first, there.and_then(|settings| settings.origin)) {
+            (None, ..) | (_, None, _) => None,
+            (Some(OriginChoice::Auto), _, Some(of_map)) => Some(of_map),
+            (Some(choice), Some((file, points)), _) => Some(choice.origin(file, points)?),
+        };
+        let settings = match self.resolution {
+            Some(resolution_m) => {
+                let origin = origin.or(there.and_then(|settings| settings.origin));
+                let new = NewMap { origin, ..self.settings.with_resolution(resolution_m) };
+                Some(client.create_map(name, new).await?.0.settings)
+            }
+            None => there,
+        };
+        let of_map = settings.and_then(|settings| settings.origin);
+        if let Some(MapOrigin { position_m }) = origin.filter(|origin| of_map != Some(*origin)) {
+            let of_map = of_map.map_or("none".to_owned(), |of_map| format!("{:?}", of_map.position_m));
+            return Err(CliError::failed(format!(
+                "the origin of map {name} is {of_map}, not {position_m:?}: --origin auto takes that of the map"
+            )));
         }
-        Ok(())
+        if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
+            output.note(format!("origin of the map: {x} {y} {z}"));
+        }
+        let has_poses = self.truth.is_some() || self.guess.is_some();
+        let points = first.map(|(_, points)| points).unwrap_or_default();
+        let resolution_m = settings.map_or(RESOLUTION_UNKNOWN_M, |settings| settings.resolution_m);
+        Ok(Survey::of(&points, origin, has_poses, resolution_m))
     }
 
-    fn first_guess(&self) -> (Guess, bool) {
-        (self.guess.map_or(Guess::Last, Guess::Pose), self.at_guess)
+    fn first_guess(&self, survey: &Survey) -> (Guess, bool) {
+        (self.guess.map_or(Guess::Last, |pose| Guess::Pose(survey.to_map(&pose))), self.at_guess)
     }
 
     /// Prints a line for each answer of the server, and counts the answers.
@@ -216,6 +254,7 @@ fn not_inserted(name: &str, error: &ClientError) -> CliError {
 /// How the scans of the files are sent.
 struct Plan {
     robot: RobotName,
+    survey: Survey,
     /// Guess of the first scan, and whether to take it as it is.
     first: (Guess, bool),
     /// Poses of the scans, map_from_sensor, if they are known.
@@ -247,7 +286,7 @@ impl Plan {
                 carve: self.carve,
                 method: self.method,
                 filter: self.filter,
-                ..ScanRequest::new(self.robot.clone(), read_points(file)?.into())
+                ..ScanRequest::new(self.robot.clone(), self.survey.read(file)?.into())
             };
             if sender.blocking_send(scan).is_err() {
                 break;
@@ -318,7 +357,12 @@ impl Display for ScanLine {
             JsonScan { verdict: "accepted", carved_voxels, .. } => {
                 write!(f, "  {} carved", count(*carved_voxels))
             }
-            JsonScan { reason, .. } => write!(f, "  {reason}"),
+            JsonScan { reason, .. } => return write!(f, "  {reason}"),
+        }?;
+        match &self.answer {
+            JsonScan { reason, .. } if SkippedPoints::is_told_in(reason) => write!(f, "  {reason}"),
+            JsonScan { points_skipped: 0, .. } => Ok(()),
+            JsonScan { points_skipped, .. } => write!(f, "  {} points skipped", count(*points_skipped)),
         }
     }
 }

@@ -111,7 +111,7 @@ impl OptionalSettings {
             false => NewFilter::Filter { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key },
         };
         let moments = self.no_moments.then_some(false);
-        NewMap { resolution_m, levels: self.levels, filter, moments }
+        NewMap { levels: self.levels, filter, moments, ..NewMap::of(resolution_m) }
     }
 }
 

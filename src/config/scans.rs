@@ -29,6 +29,8 @@ pub struct RobotConfig {
     /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
     /// skipped.
     pub body_m: Option<[[f64; 3]; 2]>,
+    /// Points at exactly 0 0 0 count as any other. false: they are skipped, since most drivers write them where nothing returned.
+    pub keep_zeros: bool,
     /// Look for the robot where its scans are refused. false.
     pub recover: bool,
     /// Take out of the map what the robot's scans saw through. false.
@@ -55,6 +57,7 @@ impl Default for RobotConfig {
             range_max_m: None,
             no_return_m: None,
             body_m: None,
+            keep_zeros: false,
             recover: false,
             carve: false,
             carve_margin_voxels: margin_voxels,
@@ -100,6 +103,7 @@ impl RobotConfig {
             range_max_m: self.range_max_m,
             no_return_m: self.no_return_m,
             body_m,
+            keep_zeros: self.keep_zeros,
         }
     }
 }

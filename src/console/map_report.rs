@@ -50,6 +50,12 @@ impl Display for MapReport {
         let (viewpoints, seen) = (count(map.viewpoints), bytes(map.viewpoint_bytes));
         write!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}, ")?;
         writeln!(f, "{viewpoints} viewpoints {seen}")?;
+        if let Some([x, y, z]) = map.settings.origin_m {
+            writeln!(
+                f,
+                "origin at {x} {y} {z} m of the survey: places there are those of the map plus these"
+            )?;
+        }
         map.sightings.iter().try_for_each(|sighting| write_sighting(f, sighting))?;
         match &map.storage {
             Some(storage) => write_storage(f, storage)?,

@@ -13,6 +13,7 @@ pub mod runtime;
 mod serve;
 mod serving;
 pub mod statistics;
+mod survey;
 pub mod truth;
 
 pub use map_report::{MapReport, bytes, count, percent};
@@ -26,3 +27,4 @@ pub use self::plan::{PlanLayer, plan};
 pub use self::points::points_of;
 pub use self::serve::{Serve, ServeOptions};
 pub use self::serving::Serving;
+pub use self::survey::{OriginChoice, Survey};

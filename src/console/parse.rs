@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use super::survey::OriginChoice;
 use mrol_map::align::localize::SearchBox;
 use mrol_map::geometry;
 use mrol_map::geometry::{Point, Pose};
@@ -33,6 +34,14 @@ pub fn point(text: &str) -> Result<Point, String> {
 pub fn cuboid(text: &str) -> Result<Region, String> {
     let (min_m, max_m) = corners(text)?;
     Region::cuboid(min_m, max_m).map_err(|error| error.to_string())
+}
+
+/// Parses the origin of a map in a survey: "x y z" (meters) or "auto".
+pub fn origin(text: &str) -> Result<OriginChoice, String> {
+    match text.trim() {
+        "auto" => Ok(OriginChoice::Auto),
+        text => numbers(text, "x y z, or auto").map(OriginChoice::At),
+    }
 }
 
 /// Parses two corners "x y z x y z", meters.

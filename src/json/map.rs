@@ -111,6 +111,10 @@ pub struct JsonSettings {
     pub filter: Option<JsonFilter>,
     /// False of a map that keeps no moments of its points.
     pub moments: bool,
+    /// Where the map's origin lies in the frame of a survey, meters: a place p of the map is at p + origin_m there.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin_m: Option<[f64; 3]>,
 }
 
 /// What stands for the settings of filters where a map has none.
@@ -211,9 +215,10 @@ impl From<MapStorage> for JsonStorage {
 }
 
 impl From<MapSettings> for JsonSettings {
-    fn from(MapSettings { resolution_m, levels, filter, moments }: MapSettings) -> Self {
+    fn from(MapSettings { resolution_m, levels, filter, moments, origin }: MapSettings) -> Self {
         let json = |FilterSettings { hashes, bits_per_key }| JsonFilter { hashes, bits_per_key };
-        Self { resolution_m, levels, filter: filter.map(json), moments }
+        let origin_m = origin.map(|origin| origin.position_m);
+        Self { resolution_m, levels, filter: filter.map(json), moments, origin_m }
     }
 }
 

@@ -40,6 +40,8 @@ pub struct Mapped {
     pub align_time: Duration,
     /// Time of the insertion.
     pub insert_time: Duration,
+    /// Number of points that lie beyond the map's range where the scan was found.
+    pub beyond_map: usize,
     /// How the robot, which was lost, was found again.
     pub recovered: Option<Recovered>,
 }
@@ -102,7 +104,9 @@ impl Mapper {
             mapper = mapper.recovering(&self.lost, RecoverySettings::default());
         }
         let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
+        let from_points = self.map.lattice().from_points(&outcome.located.alignment.map_from_sensor);
         Ok(Mapped {
+            beyond_map: points.iter().filter(|&&point| from_points.index(point).is_none()).count(),
             new_voxels: outcome.committed.map_or(0, |committed| committed.added),
             voxels: self.map.voxels(0),
             false_positive_rate,

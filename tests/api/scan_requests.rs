@@ -198,3 +198,80 @@ async fn what_an_operation_does_not_take_is_refused_and_not_passed_over() {
     }
     assert_eq!(daemon.contents("a").await.0, 0);
 }
+
+#[tokio::test]
+async fn points_at_0_0_0_are_skipped_and_named_unless_the_settings_keep_them() {
+    let daemon = Daemon::start_with(|config| {
+        config.robots.insert("keeps".into(), RobotConfig { keep_zeros: true, ..RobotConfig::default() });
+    })
+    .await;
+    let zeros = |points: &[[f32; 3]], every: usize| -> Vec<[f32; 3]> {
+        points.iter().enumerate().map(|(i, p)| if i % every == 0 { [0.0, -0.0, 0.0] } else { *p }).collect()
+    };
+    let seen = seen_from([0.01; 3]);
+    for (robot, occupied, skipped) in [("r", false, 2500), ("keeps", true, 0)] {
+        daemon.make_map(robot).await;
+        let route = format!("/v1/maps/{robot}/scans?robot={robot}&align=false");
+        let answer = json_of(daemon.post_bytes(&route, bytes_of(&zeros(&seen, 3))).await).await;
+        assert_eq!(answer["points_skipped"], skipped, "{answer}");
+        let at_sensor = json!({"points": [[0.0, 0.0, 0.0]]});
+        let found = json_of(daemon.post(&format!("/v1/maps/{robot}/occupancy"), at_sensor).await).await;
+        assert_eq!(found["occupied"], json!([occupied]), "{robot}: {found}");
+    }
+    // Three of four points at 0 0 0 do not keep a scan from its map.
+    let most: Vec<[f32; 3]> =
+        seen.iter().enumerate().map(|(i, p)| if i % 4 == 0 { *p } else { [0.0; 3] }).collect();
+    let answer = json_of(daemon.post_bytes("/v1/maps/r/scans?robot=r", bytes_of(&most)).await).await;
+    assert_eq!((&answer["accepted"], &answer["points_skipped"]), (&json!(true), &json!(5625)), "{answer}");
+    // A scan that is refused says so.
+    let elsewhere: Vec<[f32; 3]> = (0..3000)
+        .map(|i| if i % 2 == 0 { [0.0; 3] } else { [20.0 + i as f32 * 0.01, (i % 7) as f32, 5.0] })
+        .collect();
+    let answer = json_of(daemon.post_bytes("/v1/maps/r/scans?robot=r", bytes_of(&elsewhere)).await).await;
+    assert_eq!(answer["accepted"], json!(false), "{answer}");
+    let reason = answer["reason"].as_str().unwrap();
+    assert!(reason.contains("1500 of 3000 points skipped: 1500 at 0 0 0"), "{reason}");
+    let nothing = daemon.post_bytes("/v1/maps/r/scans?robot=r", bytes_of(&[[0.0; 3]; 5])).await;
+    let nothing = json_of(nothing).await;
+    assert_eq!(nothing["reason"], "no_returns", "{nothing}");
+    assert!(nothing["detail"].as_str().unwrap().contains("5 are at 0 0 0"), "{nothing}");
+}
+
+#[tokio::test]
+async fn a_scan_of_which_half_lies_beyond_a_range_says_so() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let mut points = row(100);
+    points.extend((0..100).map(|i| [1e9, i as f32, 0.0]));
+    let answer =
+        json_of(daemon.post_bytes("/v1/maps/a/scans?robot=r&align=false", bytes_of(&points)).await).await;
+    assert_eq!((&answer["accepted"], &answer["points_skipped"]), (&json!(true), &json!(100)), "{answer}");
+    let reason = answer["reason"].as_str().unwrap();
+    assert!(reason.contains("100 beyond the map's range (half of the scan or more"), "{reason}");
+}
+
+#[tokio::test]
+async fn times_of_points_that_are_skipped_may_be_anything() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let route = "/v1/maps/a/scans?robot=r&timestamp_ns=1&point_times=true&align=false";
+    for from_sweep_start in [false, true] {
+        for wrong in [f32::NAN, f32::INFINITY, f32::MAX, -4e9, 4_294.967] {
+            let times = |wrong_at: usize| -> Vec<u8> {
+                (0..4)
+                    .flat_map(|i| if i == wrong_at { wrong } else { 0.01 * i as f32 }.to_le_bytes())
+                    .collect()
+            };
+            let points = [[1.0, 2.0, 3.0], [f32::NAN, 0.0, 0.0], [2.0, 2.0, 3.0], [0.0; 3]];
+            for (wrong_at, is_taken) in [(0, false), (1, true), (2, false), (3, true)] {
+                let body = [bytes_of(&points), times(wrong_at)].concat();
+                let route = format!("{route}&point_times_from_sweep_start={from_sweep_start}");
+                let answer = json_of(daemon.post_bytes(&route, body).await).await;
+                let expected = if is_taken { json!(null) } else { json!("bad_point_times") };
+                let reason = if is_taken { &json!(null) } else { &answer["reason"] };
+                assert_eq!(reason, &expected, "{wrong} at {wrong_at}: {answer}");
+                assert_eq!(answer["accepted"] == json!(true), is_taken, "{wrong} at {wrong_at}: {answer}");
+            }
+        }
+    }
+}

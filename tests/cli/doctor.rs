@@ -133,3 +133,27 @@ fn two_folders_of_one_map_are_both_named() {
         assert!(told.contains(path.to_str().unwrap()), "{told}");
     }
 }
+
+#[test]
+fn a_damaged_map_file_of_the_first_format_is_a_problem_and_one_that_is_well_is_told() {
+    let sequence = Sequence::of(1);
+    let maps = Path::new(&sequence.path("data")).join("maps");
+    std::fs::create_dir_all(&maps).unwrap();
+    let released = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/released/data-1/maps/office.mrol");
+    let bytes = std::fs::read(released).unwrap();
+    let file = maps.join("office.mrol");
+    std::fs::write(&file, &bytes).unwrap();
+    let found = &objects(&["doctor", &sequence.path("data")])[0];
+    assert_eq!((&found["map"], &found["problems"]), (&json!("office"), &json!([])));
+    assert!(found["voxels"].as_u64().unwrap() > 0, "{found}");
+
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() / 2] ^= 1;
+    for damaged in [&flipped[..], &bytes[..bytes.len() / 2], b"", b"no map"] {
+        std::fs::write(&file, damaged).unwrap();
+        let told = mrol(&["doctor", &sequence.path("data")]).assert().code(1).get_output().clone();
+        let told = String::from_utf8(told.stdout).unwrap();
+        assert!(told.contains("map office: NOT WELL") && told.contains("office.mrol"), "{told}");
+        assert_eq!(std::fs::read(&file).unwrap(), damaged, "looking changed nothing");
+    }
+}

@@ -30,12 +30,17 @@ fn files_that_are_no_scans_are_named() {
 #[test]
 fn a_scan_of_nothing_but_no_returns_is_named() {
     let (_folder, path) = file("scan.xyz", b"nan nan nan\nnan 0 0\n");
-    assert!(complaint(&["map", &path, "--resolution", "0.1"], 1).contains("none of its 2 points is finite"));
+    assert!(
+        complaint(&["map", &path, "--resolution", "0.1"], 1).contains("none of its 2 points is a return")
+    );
+    let (_folder, path) = file("scan.xyz", b"0 0 0\nnan 0 0\n-0 0 0\n");
+    let said = complaint(&["map", &path, "--resolution", "0.1"], 1);
+    assert!(said.contains("1 not finite, 2 at 0 0 0") && said.contains("--keep-zeros"), "{said}");
 }
 
 #[test]
 fn numbers_out_of_range_are_usage_errors_that_name_the_range() {
-    let (_folder, path) = file("scan.xyz", b"0 0 0\n");
+    let (_folder, path) = file("scan.xyz", b"1 0 0\n");
     for (option, value, text) in [
         ("--resolution", "0", "resolution_m must lie in 0.001..=100"),
         ("--levels", "13", "levels must lie in 1..=12"),
@@ -66,7 +71,7 @@ fn a_truth_with_too_few_poses_is_refused() {
 
 #[test]
 fn results_that_could_not_be_written_stop_the_run_before_it_begins() {
-    let (folder, path) = file("scan.xyz", b"0 0 0\n");
+    let (folder, path) = file("scan.xyz", b"1 0 0\n");
     let out = folder.path().join("none/a.mrol");
     let arguments = ["map", &path, "--resolution", "1", "--out", out.to_str().unwrap()];
     assert!(complaint(&arguments, 1).contains("make it first"));

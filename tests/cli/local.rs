@@ -4,7 +4,7 @@ use mrol::geometry::pose_difference;
 use mrol::scan::read_trajectory;
 use mrol::store::{Disk, Snapshot};
 
-use super::{Sequence, mrol, objects};
+use super::{Sequence, complaint, mrol, objects};
 
 const SCANS: usize = 4;
 
@@ -38,7 +38,8 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
         }
         assert!(line["reason"].as_str().is_some_and(|reason| !reason.is_empty()));
         assert_eq!(line["information"].as_array().unwrap().len(), 6);
-        assert_eq!(line.as_object().unwrap().len(), 14);
+        assert!(line["points_skipped"].is_u64());
+        assert_eq!(line.as_object().unwrap().len(), 15);
     }
     let added: u64 = lines.iter().map(|line| line["new_voxels"].as_u64().unwrap()).sum();
     assert_eq!(lines[SCANS - 1]["voxels"].as_u64().unwrap(), added);
@@ -146,4 +147,47 @@ fn a_reader_that_goes_away_is_no_failure() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+}
+
+#[test]
+fn a_survey_in_doubles_makes_the_same_map_as_its_points_near_0() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // A wall of 80 x 80 points, each in the middle of a voxel of its own.
+    let local = |i: usize| [0.025 + 0.05 * (i % 80) as f64, 0.025 + 0.05 * (i / 80) as f64, 0.025];
+    let write = |name: &str, at: [f64; 3]| {
+        let header = "ply\nformat binary_little_endian 1.0\nelement vertex 6400\nproperty double x\n\
+                      property double y\nproperty double z\nend_header\n";
+        let points = (0..6400).flat_map(|i| (0..3).flat_map(move |c| (local(i)[c] + at[c]).to_le_bytes()));
+        std::fs::write(path(name), header.bytes().chain(points).collect::<Vec<u8>>()).unwrap();
+    };
+    let at = [388_096.0, 3_948_996.0, 12.0];
+    write("local.ply", [0.0; 3]);
+    write("survey.ply", at);
+    let map = |scan: &str, options: &[&str]| {
+        let (scan, out) = (path(scan), path("out.mrol"));
+        objects(&[&["map", &scan, "--resolution", "0.05", "--out", &out], options].concat());
+        let snapshot = Snapshot::read(&Disk::default(), out.as_ref()).unwrap();
+        (snapshot.contents.voxels.clone(), snapshot.settings.origin.map(|origin| origin.position_m))
+    };
+    let (expected, none) = map("local.ply", &[]);
+    assert_eq!((expected.len(), none), (6400, None));
+    let poses = path("poses.txt");
+    std::fs::write(&poses, "0 -388096 -3948996 -12 0 0 0 1\n").unwrap();
+    let to_0 = "-388096 -3948996 -12 0 0 0 1";
+    assert!(map("survey.ply", &["--first-pose", to_0]) == (expected.clone(), None));
+    assert!(map("survey.ply", &["--truth", &poses, "--at-truth"]) == (expected.clone(), None));
+    let origin = Some(at);
+    assert!(map("survey.ply", &["--origin", "388096 3948996 12"]) == (expected.clone(), origin));
+    let trajectory = path("trajectory.txt");
+    let (voxels, found) = map("survey.ply", &["--origin", "auto", "--trajectory-out", &trajectory]);
+    assert!(voxels == expected && found == origin, "{found:?}");
+    // Exports are in the coordinates of the survey again, in which this scan was not moved.
+    let pose = read_trajectory(trajectory.as_ref()).unwrap()[0].map_from_sensor;
+    assert!(pose.translation.vector.norm() < 1e-6, "{pose}");
+    let refused = complaint(&["map", &path("survey.ply"), "--resolution", "0.05"], 1);
+    assert!(
+        refused.contains("survey.ply") && refused.contains("--origin \"388096 3948996 12\""),
+        "{refused}"
+    );
 }

@@ -94,6 +94,7 @@ impl ScanFields<'_> {
                 range_max_m: self.range_max_m,
                 no_return_m: None,
                 body_m: self.body_m,
+                keep_zeros: false,
             },
             strict: self.strict,
             ..ScanRequest::new(robot, points_of(points))

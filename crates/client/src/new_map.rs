@@ -2,7 +2,7 @@
 
 use crate::wire::pb;
 use mrol_map::bloom::FilterSettings;
-use mrol_map::map::MapName;
+use mrol_map::map::{MapName, MapOrigin};
 
 /// Settings of a map to create; the server's default where a field is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +15,8 @@ pub struct NewMap {
     pub filter: NewFilter,
     /// The map keeps the moments of its points, which alignments are refined on. True where none.
     pub moments: Option<bool>,
+    /// Where the map's frame lies in that of a survey.
+    pub origin: Option<MapOrigin>,
 }
 
 /// Filters of a map to create.
@@ -51,19 +53,20 @@ impl From<Option<FilterSettings>> for NewFilter {
 impl NewMap {
     /// Settings with the side of a finest voxel `resolution_m` (meters), and defaults for all else.
     pub fn of(resolution_m: f64) -> Self {
-        Self { resolution_m, levels: None, filter: NewFilter::default(), moments: None }
+        Self { resolution_m, levels: None, filter: NewFilter::default(), moments: None, origin: None }
     }
 }
 
 impl From<(&MapName, NewMap)> for pb::CreateMapRequest {
     fn from((map, new): (&MapName, NewMap)) -> Self {
-        let NewMap { resolution_m, levels, filter, moments } = new;
+        let NewMap { resolution_m, levels, filter, moments, origin } = new;
+        let origin_m = origin.map(|origin| origin.position_m.into());
         let filter = match filter {
             NewFilter::Filter { hashes, bits_per_key } => Some(pb::FilterSettings { hashes, bits_per_key }),
             NewFilter::NoFilter => None,
         };
         let no_filter = filter.is_none();
-        let settings = pb::MapSettings { resolution_m, levels, filter, no_filter, moments };
+        let settings = pb::MapSettings { resolution_m, levels, filter, no_filter, moments, origin_m };
         Self { map: map.to_string(), settings: Some(settings) }
     }
 }

@@ -17,7 +17,8 @@ use mrol_map::align::localize::{
 };
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapName, MultiResolutionMap};
-use mrol_map::scan::{read_points, scan_files};
+use mrol_map::mapping::MappingError;
+use mrol_map::scan::{PointFilter, SkippedPoints, read_points, scan_files};
 use mrol_map::util::StopSignal;
 use mrol_service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
 use mrol_store::{Disk, Snapshot};
@@ -159,9 +160,11 @@ fn find_here(
     output: &Output,
 ) -> Result<LocalizationAnswer, CliError> {
     let all = request.points.as_slice();
-    let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
+    let skipped = SkippedPoints::of(all, &PointFilter::default());
+    let points: Vec<Point> =
+        all.iter().copied().filter(|point| PointFilter::default().keeps(*point)).collect();
     if points.is_empty() {
-        return Err(CliError::failed(format!("none of the scan's {} points is finite", all.len())));
+        return Err(CliError::failed(MappingError::NoReturns { points: all.len(), zeros: skipped.zeros }));
     }
     let start = Instant::now();
     let mut tell = |progress: &SearchProgress| {
@@ -189,5 +192,5 @@ fn find_here(
         },
     )
     .map_err(CliError::failed)?;
-    Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), version))
+    Ok(LocalizationAnswer::of(found, &skipped, start.elapsed(), version))
 }

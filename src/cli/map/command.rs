@@ -12,14 +12,17 @@ use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::true_poses;
+use mrol::console::{OriginChoice, Survey};
 use mrol::offline::FalsePositives;
 use mrol::offline::TruthErrors;
 use mrol::offline::{Mapped, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
-use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapSettings};
-use mrol_map::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
+use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
+use mrol_map::scan::{
+    PointFilter, SkippedPoints, StampedPose, read_exact_points, scan_files, write_trajectory,
+};
 use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
@@ -32,6 +35,7 @@ EXAMPLES:
                                                              are the filters ample? (last line)
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
                                                              a map for queries, in a small part of the memory
+  mrol map utm/*.pcd --resolution 0.1 --origin auto --out site.mrol     scans in the coordinates of a survey
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
 
@@ -83,6 +87,13 @@ pub(crate) struct Map {
     alignment: AlignmentOptions,
     #[command(flatten)]
     points: PointOptions,
+    /// Take points at exactly 0 0 0 as any other [default: they are skipped, as drivers write them where nothing returned]
+    #[arg(long)]
+    keep_zeros: bool,
+    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It is
+    /// subtracted from them in double precision, and kept in the map
+    #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
+    origin: Option<OriginChoice>,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
     #[arg(long, value_parser = parse::keyword::<Lookup>())]
     lookup: Option<Lookup>,
@@ -102,20 +113,28 @@ pub(crate) struct Map {
 
 impl Map {
     pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
-        let mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
-        let mut mapper = mapper.recovering(!self.no_recovery);
+        let alignment = self.alignment_settings()?;
+        self.map_settings().checked().map_err(CliError::usage)?;
         let filter = self.points.filter().map_err(CliError::usage)?;
+        let filter = PointFilter { keep_zeros: self.keep_zeros, ..filter };
         let files = scan_files(&self.scans)?;
         let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
         self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
 
-        let mut run = Run::new(&self, truth, &files);
+        let (survey, origin) = self.survey(&files)?;
+        let settings = MapSettings { origin, ..self.map_settings() };
+        let mapper = Mapper::new(settings, alignment, self.guess.into())?;
+        let mut mapper = mapper.recovering(!self.no_recovery);
+        if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
+            output.note(format!("origin of the map: {x} {y} {z}"));
+        }
+        let mut run = Run::new(&self, truth, &files, survey);
         let output = output.with_bar(files.len());
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
-            let points = usable_points(file, &filter)?;
+            let (points, skipped) = usable_points(file, &filter, &survey)?;
             let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
-            output.print(&run.note(k, file, &mapped))?;
+            output.print(&run.note(k, file, &mapped, skipped))?;
             output.step();
         }
         output.clear_bar();
@@ -126,6 +145,17 @@ impl Map {
             true => Ok(()),
             false => output.print(&summary),
         }
+    }
+
+    /// How the scans lie to the map, and the map's origin, if it is to have one.
+    fn survey(&self, files: &[PathBuf]) -> Result<(Survey, Option<MapOrigin>), CliError> {
+        let Some(file) = files.first() else {
+            return Ok((Survey::of(&[], None, false, self.resolution), None));
+        };
+        let first = read_exact_points(file)?;
+        let origin = self.origin.map(|choice| choice.origin(file, &first)).transpose()?;
+        let has_poses = self.first_pose.is_some() || self.at_truth;
+        Ok((Survey::of(&first, origin, has_poses, self.resolution), origin))
     }
 
     fn map_settings(&self) -> MapSettings {
@@ -161,6 +191,7 @@ impl Map {
 
 /// State of a run.
 struct Run {
+    survey: Survey,
     first_pose: Option<Pose>,
     at_truth: bool,
     truth: Option<TruthErrors>,
@@ -172,9 +203,12 @@ struct Run {
 }
 
 impl Run {
-    fn new(options: &Map, truth: Option<Vec<Pose>>, files: &[PathBuf]) -> Self {
+    fn new(options: &Map, truth: Option<Vec<Pose>>, files: &[PathBuf], survey: Survey) -> Self {
+        let to_map = |pose: Pose| survey.to_map(&pose);
+        let truth = truth.map(|poses| poses.into_iter().map(to_map).collect());
         Self {
-            first_pose: options.first_pose,
+            survey,
+            first_pose: options.first_pose.map(to_map),
             at_truth: options.at_truth,
             truth: truth.map(TruthErrors::new),
             trajectory: Vec::new(),
@@ -196,16 +230,18 @@ impl Run {
     }
 
     /// Records the result of scan `k`; returns its line.
-    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped) -> ScanLine {
+    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped, skipped: SkippedPoints) -> ScanLine {
         self.scans += 1;
         self.false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
         let map_from_sensor = mapped.alignment.map_from_sensor;
         let accepted = mapped.accepted();
         if accepted {
+            let map_from_sensor = self.survey.to_survey(&map_from_sensor);
             self.trajectory.push(StampedPose { id: k as f64, map_from_sensor });
         }
         let error = self.truth.as_mut().filter(|_| accepted).map(|truth| truth.add(k, &map_from_sensor));
-        ScanLine::of(name_of(file), mapped, error, self.name_width)
+        let skipped = SkippedPoints { beyond_map: mapped.beyond_map, ..skipped };
+        ScanLine::of(name_of(file), mapped, &skipped, error, self.name_width)
     }
 
     fn summary(&self, mapper: &Mapper) -> Summary {
@@ -223,23 +259,26 @@ impl Run {
     }
 }
 
-/// Reads the points of a scan that are finite and pass the filter.
-fn usable_points(file: &Path, filter: &PointFilter) -> Result<Vec<Point>, CliError> {
-    let mut points = read_points(file)?;
-    let all = points.len();
-    points.retain(|point| point.is_finite());
-    let finite = points.len();
+/// Reads the points of a scan that pass the filter, and counts those that do not.
+fn usable_points(
+    file: &Path,
+    filter: &PointFilter,
+    survey: &Survey,
+) -> Result<(Vec<Point>, SkippedPoints), CliError> {
+    let mut points = survey.read(file)?;
+    let skipped = SkippedPoints::of(&points, filter);
     points.retain(|&point| filter.keeps(point));
-    match (all, finite, points.len()) {
-        (0, ..) => Err(in_file(file, "no point in this file")),
-        (_, 0, _) => {
-            Err(in_file(file, format!("none of its {all} points is finite: nothing but no-returns")))
-        }
-        (.., 0) => {
-            let problem = format!("none of its {finite} points passes --range-min, --range-max and --body");
-            Err(in_file(file, problem))
-        }
-        _ => Ok(points),
+    match (skipped.points, points.is_empty()) {
+        (0, _) => Err(in_file(file, "no point in this file")),
+        (all, true) if skipped.not_finite + skipped.zeros == all => Err(in_file(
+            file,
+            format!("none of its {all} points is a return ({skipped}); --keep-zeros keeps those at 0 0 0"),
+        )),
+        (_, true) => Err(in_file(
+            file,
+            format!("none of its points passes --range-min, --range-max and --body ({skipped})"),
+        )),
+        _ => Ok((points, skipped)),
     }
 }
 

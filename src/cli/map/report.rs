@@ -11,6 +11,7 @@ use mrol::json::JsonPose;
 use mrol::offline::ErrorSummary;
 use mrol::offline::FilterSummary;
 use mrol::offline::Mapped;
+use mrol_map::scan::SkippedPoints;
 use mrol_map::util::Keyword;
 
 /// The line of a scan.
@@ -28,6 +29,9 @@ pub(super) struct ScanLine {
     iterations: u32,
     new_voxels: usize,
     voxels: usize,
+    points_skipped: usize,
+    #[serde(skip)]
+    is_mostly_beyond: bool,
     align_ms: f64,
     insert_ms: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,12 +45,20 @@ pub(super) struct ScanLine {
 }
 
 impl ScanLine {
-    pub(super) fn of(scan: String, mapped: &Mapped, error: Option<(f64, f64)>, name_width: usize) -> Self {
+    pub(super) fn of(
+        scan: String,
+        mapped: &Mapped,
+        skipped: &SkippedPoints,
+        error: Option<(f64, f64)>,
+        name_width: usize,
+    ) -> Self {
         Self {
             scan,
             accepted: mapped.accepted(),
             verdict: mapped.alignment.verdict.as_str(),
-            reason: mapped.alignment.reason.clone(),
+            reason: skipped.explain(mapped.accepted(), &mapped.alignment.reason),
+            points_skipped: skipped.total(),
+            is_mostly_beyond: skipped.is_mostly_beyond(),
             map_from_sensor: (&mapped.alignment.map_from_sensor).into(),
             overlap: mapped.alignment.overlap(),
             level_overlaps: mapped.alignment.level_overlaps.clone(),
@@ -93,6 +105,11 @@ impl Display for ScanLine {
             (Some(meters), Some(degrees)) => write!(f, "  {meters:>8.4}  {degrees:>7.3}")?,
             _ if !self.accepted => write!(f, "  {}", self.reason)?,
             _ => {}
+        }
+        match self.accepted && self.points_skipped > 0 {
+            true if self.is_mostly_beyond => write!(f, "  {}", self.reason)?,
+            true => write!(f, "  {} points skipped", count(self.points_skipped))?,
+            false => {}
         }
         if let Some(how) = self.recovered {
             write!(f, "  recovered: {how}")?;

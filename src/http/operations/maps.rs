@@ -12,7 +12,7 @@ use crate::http::forms::{Map, NoParams};
 use crate::http::middleware::Service;
 use crate::json::JsonMap;
 use mrol_map::bloom::FilterSettings;
-use mrol_map::map::{LEVELS_DEFAULT, MapName, MapSettings};
+use mrol_map::map::{LEVELS_DEFAULT, MapName, MapOrigin, MapSettings};
 use mrol_service::UnavailableMap;
 
 /// The settings of a new map.
@@ -31,6 +31,8 @@ pub(crate) struct SettingsBody {
     filter: FilterChoice,
     /// Whether the map keeps moments of its points, by which scans are refined; true without.
     moments: Option<bool>,
+    /// Where the map's origin lies in the frame of a survey, meters; kept with the map.
+    origin_m: Option<[f64; 3]>,
 }
 
 impl SettingsBody {
@@ -40,6 +42,7 @@ impl SettingsBody {
             levels: self.levels.unwrap_or(LEVELS_DEFAULT),
             filter: self.filter.or(filter),
             moments: self.moments.unwrap_or(true),
+            origin: self.origin_m.map(|position_m| MapOrigin { position_m }),
         }
     }
 }

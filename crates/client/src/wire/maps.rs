@@ -6,7 +6,7 @@ use super::pb;
 use super::scan::verdict_from;
 use super::values::{InField, count_from, required};
 use mrol_map::bloom::FilterSettings;
-use mrol_map::map::{FilterInfo, LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
+use mrol_map::map::{FilterInfo, LEVELS_DEFAULT, LevelInfo, MapName, MapOrigin, MapSettings, RobotName};
 use mrol_map::mapping::Sighting;
 use mrol_map::util::Durations;
 use mrol_service::{MapInfo, MapList, MapStorage, Reason, ServiceError, UnavailableMap};
@@ -38,6 +38,7 @@ fn settings_from(settings: &pb::MapSettings, default: FilterSettings) -> Result<
         levels: settings.levels.unwrap_or(LEVELS_DEFAULT),
         filter,
         moments: settings.moments.unwrap_or(true),
+        origin: settings.origin_m.map(|origin| MapOrigin { position_m: origin.into() }),
     })
 }
 
@@ -62,6 +63,7 @@ impl From<MapSettings> for pb::MapSettings {
             filter: settings.filter.map(Into::into),
             no_filter: settings.filter.is_none(),
             moments: Some(settings.moments),
+            origin_m: settings.origin.map(|origin| origin.position_m.into()),
         }
     }
 }

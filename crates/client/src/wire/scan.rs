@@ -175,8 +175,12 @@ impl From<ScanRequest> for pb::Scan {
             robot: scan.robot.to_string(),
             session: scan.session.to_string(),
             scan_id: scan.scan_id,
+            point_times_reference: match scan.point_times.as_ref().map(PointTimes::reference) {
+                None => pb::TimeReference::Unspecified.into(),
+                Some(TimeReference::Timestamp) => pb::TimeReference::Timestamp.into(),
+                Some(TimeReference::SweepStart) => pb::TimeReference::SweepStart.into(),
+            },
             point_times: scan.point_times.map(|times| times.to_bytes().into()).unwrap_or_default(),
-            point_times_reference: pb::TimeReference::Unspecified.into(),
             points: Some(scan.points.into()),
             timestamp_ns: scan.timestamp_ns,
             gravity_in_sensor: scan.gravity.map(|gravity| gravity.in_sensor().into()),

@@ -37,6 +37,7 @@ impl Target {
             levels: Some(settings.levels),
             filter: settings.filter.into(),
             moments: Some(settings.moments),
+            origin: settings.origin,
         };
         client.create_map(&map, new_map).await?;
         let resolution_m = settings.resolution_m;

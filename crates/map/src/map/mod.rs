@@ -31,6 +31,7 @@ pub mod lookup;
 mod moments;
 mod multi_resolution_map;
 mod name;
+mod origin;
 mod regions;
 mod settings;
 mod shards;
@@ -62,6 +63,7 @@ pub use multi_resolution_map::MultiResolutionMap;
 pub use name::{
     CallerName, KeepOutName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName,
 };
+pub use origin::{MapOrigin, MapOriginError};
 pub use regions::{
     CellBox, Frustum, FrustumError, OrientedBox, REGION_M_MAX, Region, RegionError, VoxelSelection,
 };

@@ -1,5 +1,6 @@
 //! What a map is made with.
 
+use super::origin::{MapOrigin, MapOriginError};
 use crate::bloom::{FilterSettings, FilterSettingsError};
 use crate::voxel::{Lattice, SettingError};
 
@@ -15,6 +16,8 @@ pub struct MapSettings {
     /// The map keeps the moments of its points, which alignments are refined on. Without them the ascent on overlap
     /// alone finds poses.
     pub moments: bool,
+    /// Where the map's frame lies in that of a survey; none where nobody said.
+    pub origin: Option<MapOrigin>,
 }
 
 /// Levels of a map where its maker does not say: voxels up to 32 r_0, so that an alignment finds its way from 1 m and 20
@@ -30,12 +33,15 @@ pub enum MapSettingsError {
     /// An error in the settings of the filter.
     #[error(transparent)]
     Filter(#[from] FilterSettingsError),
+    /// An error in the origin.
+    #[error(transparent)]
+    Origin(#[from] MapOriginError),
 }
 
 impl MapSettings {
     /// Settings of a map of `resolution_m` with `levels` levels, the default filter, and moments.
     pub fn new(resolution_m: f64, levels: u32) -> Self {
-        Self { resolution_m, levels, filter: Some(FilterSettings::default()), moments: true }
+        Self { resolution_m, levels, filter: Some(FilterSettings::default()), moments: true, origin: None }
     }
 
     /// Settings of a map of `resolution_m` with `levels` levels that keeps its exact set alone, for queries: about a
@@ -54,6 +60,7 @@ impl MapSettings {
 
     pub(super) fn lattice(&self) -> Result<Lattice, MapSettingsError> {
         self.filter.map(FilterSettings::checked).transpose()?;
+        self.origin.map(|origin| MapOrigin::new(origin.position_m)).transpose()?;
         Ok(Lattice::new(self.resolution_m, self.levels)?)
     }
 }

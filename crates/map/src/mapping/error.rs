@@ -1,7 +1,7 @@
 //! Errors of mapping.
 
 use crate::map::RobotName;
-use crate::scan::PointFilterError;
+use crate::scan::{PointFilterError, SkippedPoints};
 
 /// Why a scan cannot be mapped. The map is as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -14,22 +14,29 @@ pub enum MappingError {
         /// Number of points that are not finite.
         count: usize,
     },
-    /// No point is finite.
-    #[error("none of the scan's {points} points is finite: nothing but no-returns")]
+    /// No point is one at which a ray ended.
+    #[error(
+        "none of the scan's {points} points is a return: {zeros} are at 0 0 0, the others are not finite; \
+         keep_zeros of the robot's settings keeps those at 0 0 0"
+    )]
     NoReturns {
         /// Number of points of the scan.
         points: usize,
+        /// Number of points at 0 0 0.
+        zeros: usize,
     },
     /// The point filter is not valid.
     #[error(transparent)]
     BadFilter(#[from] PointFilterError),
     /// The filter leaves no point.
-    #[error("none of the scan's {points} points passes the filter of robot {robot}: {filter}")]
+    #[error("none of the scan's {points} points passes the filter of robot {robot}: {filter} ({skipped})")]
     AllFiltered {
         /// Number of points of the scan.
         points: usize,
         /// The filter, as text.
         filter: String,
+        /// Why they were skipped.
+        skipped: SkippedPoints,
         /// The robot whose scan it is.
         robot: RobotName,
     },

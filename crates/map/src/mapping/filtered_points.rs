@@ -4,9 +4,10 @@ use super::error::MappingError;
 use super::ray_ends::RayEnds;
 use crate::geometry::Point;
 use crate::map::RobotName;
-use crate::scan::PointFilter;
+use crate::scan::{PointFilter, SkippedPoints};
 
-/// The points of a scan, told apart by its robot's filter; those that are not finite are left out.
+/// The points of a scan, told apart by its robot's filter; those at which nothing returned are left out: they
+/// are not finite, or at exactly 0 0 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilteredPoints {
     /// Those that show the robot's surroundings.
@@ -15,8 +16,8 @@ pub struct FilteredPoints {
     no_returns: TimedPoints,
     /// Those of the robot itself, or too near: what lies behind them was not seen.
     of_robot: TimedPoints,
-    /// How many points do not show the surroundings.
-    pub skipped: usize,
+    /// How many points do not show the surroundings, and why.
+    pub skipped: SkippedPoints,
     filter: PointFilter,
 }
 
@@ -28,14 +29,16 @@ struct TimedPoints {
 }
 
 impl TimedPoints {
-    /// What `select` makes of the points.
+    /// What `select` makes of the points; those whose time is no number are left out.
     fn of(all: RayEnds<'_>, select: impl Fn(Point) -> Option<Point>) -> Self {
-        let points = all.points.iter().filter_map(|&point| select(point)).collect();
-        let times_s = all.times_s.map(|times_s| {
-            let timed = all.points.iter().zip(times_s);
-            timed.filter(|&(&point, _)| select(point).is_some()).map(|(_, &time_s)| time_s).collect()
-        });
-        Self { points, times_s }
+        let Some(times_s) = all.times_s else {
+            let points = all.points.iter().filter_map(|&point| select(point)).collect();
+            return Self { points, times_s: None };
+        };
+        let timed = all.points.iter().zip(times_s).filter(|(_, time_s)| time_s.is_finite());
+        let (points, times_s) =
+            timed.filter_map(|(&point, &time_s)| select(point).map(|point| (point, time_s))).unzip();
+        Self { points, times_s: Some(times_s) }
     }
 
     fn as_ends(&self) -> RayEnds<'_> {
@@ -45,7 +48,7 @@ impl TimedPoints {
 
 impl FilteredPoints {
     /// Filters the points of a scan. A point that is not finite means "no return" in every depth camera: it is left out, or an error
-    /// where the scan is `strict`.
+    /// where the scan is `strict`. Times that are no numbers are those of points that do not count.
     ///
     /// # Errors
     /// No point is left, a strict scan has a point that is not finite, or the filter is not valid.
@@ -61,21 +64,20 @@ impl FilteredPoints {
             let index = all.points.iter().position(|point| !point.is_finite()).unwrap_or_default();
             return Err(MappingError::NotFinite { index, count: not_finite });
         }
-        if not_finite == points {
-            return Err(MappingError::NoReturns { points });
-        }
         let filter = filter.checked()?;
-        let finite = |point: Point| point.is_finite().then_some(point);
-        let surroundings = TimedPoints::of(all, |point| finite(point).filter(|&point| filter.keeps(point)));
+        let skipped = SkippedPoints::of(all.points, &filter);
+        if skipped.not_finite + skipped.zeros == points {
+            return Err(MappingError::NoReturns { points, zeros: skipped.zeros });
+        }
+        let surroundings = TimedPoints::of(all, |point| filter.keeps(point).then_some(point));
         if surroundings.points.is_empty() {
             let filter = filter.to_string();
-            return Err(MappingError::AllFiltered { points, filter, robot: robot.clone() });
+            return Err(MappingError::AllFiltered { points, filter, skipped, robot: robot.clone() });
         }
-        let skipped = points - surroundings.points.len();
         Ok(Self {
             surroundings,
             no_returns: TimedPoints::of(all, |point| filter.passed_to(point)),
-            of_robot: TimedPoints::of(all, |point| finite(point).filter(|&point| filter.is_of_robot(point))),
+            of_robot: TimedPoints::of(all, |point| filter.is_of_robot(point).then_some(point)),
             skipped,
             filter,
         })
@@ -98,6 +100,6 @@ impl FilteredPoints {
 
     /// True of a point (sensor frame) that passes the filter.
     pub fn keeps(&self, point: Point) -> bool {
-        point.is_finite() && self.filter.keeps(point)
+        self.filter.keeps(point)
     }
 }

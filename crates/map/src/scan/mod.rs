@@ -1,14 +1,16 @@
 //! Scans: point clouds and trajectories in files.
 //!
 //! A scan is a `Vec<Point>` in its sensor's frame, meters; a point with a NaN or infinite coordinate means "no
-//! return", and readers and sensors alike keep it.
+//! return", as does one at exactly 0 0 0, and readers and sensors alike keep it.
 
 mod point_filter;
 mod reader;
+mod skipped;
 mod tum;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
-pub use reader::{ReadError, parse_points, read_points, scan_files};
+pub use reader::{ReadError, parse_points, read_exact_points, read_points, scan_files};
+pub use skipped::SkippedPoints;
 pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
 pub use writer::{write_f32, write_ply};

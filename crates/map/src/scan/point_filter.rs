@@ -19,6 +19,8 @@ pub struct PointFilter {
     pub no_return_m: Option<f64>,
     /// The robot's own body in the sensor frame, meters: smallest and largest corner; points within are skipped.
     pub body_m: Option<([f64; 3], [f64; 3])>,
+    /// Points at exactly 0 0 0 count as any other. Otherwise they are skipped: most drivers write them where nothing returned.
+    pub keep_zeros: bool,
 }
 
 /// What it skips, by the names of its fields.
@@ -88,20 +90,37 @@ impl PointFilter {
             range_max_m: self.range_max_m.or(fallback.range_max_m),
             no_return_m: self.no_return_m.or(fallback.no_return_m),
             body_m: self.body_m.or(fallback.body_m),
+            keep_zeros: self.keep_zeros || fallback.keep_zeros,
         }
     }
 
-    /// True when the filter keeps a finite point (sensor frame).
+    /// True of a point (sensor frame) at which a ray ended: it is finite, and not the 0 0 0 of a driver for which nothing returned.
+    pub fn is_return(&self, point: Point) -> bool {
+        point.is_finite() && (self.keep_zeros || point.xyz() != [0.0; 3])
+    }
+
+    /// True of a finite point (sensor frame) at the distance that means "nothing returned", or farther.
+    pub fn is_no_return(&self, point: Point) -> bool {
+        // Points at the limit itself were rounded to f32, some of them to nearer than it.
+        let range_m = point.to_f64().coords.norm();
+        self.no_return_m.is_some_and(|no_return_m| range_m >= no_return_m * (1.0 - ROUNDING))
+    }
+
+    /// True when the filter keeps a point (sensor frame).
     pub fn keeps(&self, point: Point) -> bool {
         let range_m = point.to_f64().coords.norm();
-        self.range_max_m.is_none_or(|max| range_m <= max)
-            && self.no_return_m.is_none_or(|max| range_m < max * (1.0 - ROUNDING))
+        self.is_return(point)
+            && self.range_max_m.is_none_or(|max| range_m <= max)
+            && !self.is_no_return(point)
             && !self.is_of_robot(point)
     }
 
     /// True of a finite point (sensor frame) that is skipped since it lies on the robot itself, or too near to be anything else. It hides
     /// what lies behind it.
     pub fn is_of_robot(&self, point: Point) -> bool {
+        if !self.is_return(point) {
+            return false;
+        }
         let point = point.to_f64().coords;
         self.range_min_m.is_some_and(|min| point.norm() < min)
             || self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])))
@@ -111,14 +130,13 @@ impl PointFilter {
     /// at all, and to itself where it is nearer than that. None of a point that is kept, and of one without a direction; none at all
     /// where nobody says from where on nothing was met, since a driver may say that by any distance.
     pub fn passed_to(&self, point: Point) -> Option<Point> {
-        let no_return_m = self.no_return_m.filter(|_| point.is_finite())?;
+        let no_return_m = self.no_return_m.filter(|_| self.is_return(point))?;
         let itself = point;
         let point = point.to_f64().coords;
         let range_m = point.norm();
-        if range_m < no_return_m * (1.0 - ROUNDING) {
+        if !self.is_no_return(itself) {
             return self.range_max_m.filter(|max| range_m > *max).map(|_| itself);
         }
-        // Points at the limit itself were rounded to f32, some of them to nearer than it.
         let to: [f64; 3] = (point * (no_return_m / range_m)).into();
         Some(Point::from(to.map(|c| c as f32)))
     }
@@ -145,6 +163,7 @@ mod tests {
             range_max_m: Some(10.0),
             no_return_m: None,
             body_m: Some(([-1.0, -0.4, -0.8], [0.2, 0.4, 0.0])),
+            keep_zeros: false,
         };
         let keeps = |x, y, z| filter.keeps(Point::new(x, y, z));
         assert!(keeps(1.0, 0.0, 0.0) && keeps(0.0, 10.0, 0.0));
@@ -152,7 +171,18 @@ mod tests {
         let is_of_robot = |x, y, z| filter.is_of_robot(Point::new(x, y, z));
         assert!(is_of_robot(0.1, 0.2, 0.3) && is_of_robot(-0.9, 0.3, -0.1));
         assert!(!is_of_robot(0.0, 10.1, 0.0) && !is_of_robot(1.0, 0.0, 0.0));
-        assert!(PointFilter::default().keeps(Point::new(0.0, 0.0, 0.0)));
+    }
+
+    #[test]
+    fn zeros_are_no_returns_without_a_direction_unless_they_are_kept() {
+        let zero = Point::new(0.0, -0.0, 0.0);
+        let filter =
+            PointFilter { range_min_m: Some(0.5), no_return_m: Some(30.0), ..PointFilter::default() };
+        assert!(!filter.keeps(zero) && !filter.is_of_robot(zero) && filter.passed_to(zero).is_none());
+        assert!(!PointFilter::default().keeps(zero));
+        let kept = PointFilter { keep_zeros: true, ..PointFilter::default() };
+        assert!(kept.keeps(zero) && PointFilter::default().or(kept).keeps(zero));
+        assert!(PointFilter { keep_zeros: true, ..filter }.is_of_robot(zero));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use super::reader::{Problem, ReadError, lines, number, read_file};
+use super::reader::{Problem, ReadError, content_lines, number, read_file};
 use crate::geometry::{Pose, pose, rotation_xyzw, translation_m};
 
 /// Number of columns of a line: id, tx ty tz in meters, qx qy qz qw.
@@ -61,9 +61,8 @@ pub fn write_trajectory(path: &Path, poses: &[StampedPose]) -> io::Result<()> {
 
 fn trajectory(bytes: &[u8]) -> Result<Vec<StampedPose>, Problem> {
     let mut poses = Vec::new();
-    for line in lines(bytes, 1) {
-        let (line, text) = line?;
-        poses.push(stamped_pose(text).map_err(|problem| Problem::at_line(line, problem))?);
+    for (line, text) in content_lines(bytes)? {
+        poses.push(stamped_pose(&text).map_err(|problem| Problem::at_line(line, problem))?);
     }
     Ok(poses)
 }

@@ -92,7 +92,7 @@ reasons! {
         BadLookup "bad_lookup" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadMapFile "bad_map_file" Both: "the file is no map file, or is damaged", "take another backup; `mrol map` and `mrol snapshot` write such files";
         BadMessage "bad_message" Grpc: "the message cannot be read", "check encoding and compression";
-        BadPointTimes "bad_point_times" Both: "`point_times` are not one for each point, not finite, beyond `point_times_max_s`, or without `timestamp_ns`", "send seconds from `timestamp_ns`, one for each point";
+        BadPointTimes "bad_point_times" Both: "`point_times` are not one for each point, without `timestamp_ns`, or of points that count not finite or beyond `point_times_max_s`", "send seconds from `timestamp_ns`, one for each point";
         BadMethod "bad_method" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadName "bad_name" Both: "the name of a map, keep-out, robot or request is not valid", "see [names](#rules-for-all-requests)";
         BadNumbers "bad_numbers" Http: "a parameter is not so many numbers with commas", "correct it";
@@ -115,7 +115,7 @@ reasons! {
         LevelOutOfRange "level_out_of_range" Both: "the map has no such level", "the message names the levels";
         MethodNotAllowed "method_not_allowed" Http 405: "the route has other methods; `Allow` names them", "correct it";
         MissingField "missing_field" Both: "a required field is not there", "give it";
-        NoReturns "no_returns" Both: "no point of the scan is finite", "check the driver";
+        NoReturns "no_returns" Both: "no point of the scan is a return: all are not finite or at 0 0 0", "check the driver; `keep_zeros` keeps points at 0 0 0";
         NothingThere "nothing_there" Both: "the search box lies away from the map", "correct it";
         PageTooLarge "page_too_large" Both: "`limit` is not 1 to `trajectory_page_max`", "ask for pages by `since_revision`";
         PointNotFinite "point_not_finite" Both: "NaN or infinity in a query, or in a `strict` scan", "remove the point";

@@ -338,12 +338,14 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
 
 /// All settings of a map as text.
 fn description(settings: &MapSettings) -> String {
-    let MapSettings { resolution_m, levels, filter, moments } = settings;
+    let MapSettings { resolution_m, levels, filter, moments, origin } = settings;
     let filter = filter.map_or("no filter".to_owned(), |FilterSettings { hashes, bits_per_key }| {
         format!("filter_hashes {hashes}, filter_bits_per_key {bits_per_key}")
     });
     let moments = if *moments { "moments" } else { "no moments" };
-    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}")
+    let origin =
+        origin.map_or("no origin_m".to_owned(), |origin| format!("origin_m {:?}", origin.position_m));
+    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}, {origin}")
 }
 
 #[cfg(test)]

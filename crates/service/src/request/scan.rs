@@ -78,13 +78,11 @@ impl ScanRequest {
     }
 
     /// # Errors
-    /// For too many points or none, and for times that are not theirs.
+    /// For too many points or none, times that are not as many, and times without a timestamp.
     pub(crate) fn check_points(&self, limits: &Limits) -> Result<(), ServiceError> {
         limits.check_points(self.points.len())?;
         let times = self.point_times.as_ref();
-        times.map_or(Ok(()), |times| {
-            times.check(self.points.len(), self.timestamp_ns, limits.point_times_max_s)
-        })
+        times.map_or(Ok(()), |times| times.check(self.points.len(), self.timestamp_ns))
     }
 
     /// A robot's scan, of which nothing else is said.
@@ -140,7 +138,7 @@ pub struct ScanAnswer {
     pub iterations: u32,
     /// Time that it took.
     pub align_time: Duration,
-    /// Points that were not finite, out of the robot's range, on its body, or out of the map's range.
+    /// Points that were not finite, at 0 0 0, out of the robot's range, on its body, or out of the map's range.
     pub points_skipped: usize,
     /// Finest voxels added; 0 where nothing was.
     pub new_voxels: usize,

@@ -6,11 +6,15 @@ use crate::settings::ServiceSettings;
 use mrol_map::align::PoseCovarianceError;
 use mrol_map::geometry::{Point, rotation_xyzw, translation_m};
 use mrol_map::mapping::{FilteredPoints, Guess, MappingError, RayEnds, Scan};
+use mrol_map::scan::SkippedPoints;
+use mrol_map::voxel::LatticeFromPoints;
 
 /// A scan request with the points of the robot's surroundings.
 pub(super) struct FilteredScan<'a> {
     pub(super) request: &'a ScanRequest,
     filtered: FilteredPoints,
+    /// When each of the request's points was measured; not a number of those that do not count.
+    pub(super) times: Option<PointTimes>,
     /// The digest of the request.
     pub(super) digest: u64,
 }
@@ -19,19 +23,20 @@ impl<'a> FilteredScan<'a> {
     /// Leaves out what the request's filter, or the server's for this robot, does not keep.
     ///
     /// # Errors
-    /// When no point is left, or one had to be left out of a strict request.
+    /// When no point is left, one had to be left out of a strict request, or a time of a point that counts is none.
     pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
         let filter = request.filter.or(settings.of_robot(&request.robot).filter);
-        let filtered = FilteredPoints::of(
-            RayEnds {
-                points: request.points.as_slice(),
-                times_s: request.point_times.as_ref().map(PointTimes::as_slice),
-            },
-            filter,
-            &request.robot,
-            request.strict,
-        )?;
-        Ok(Self { request, filtered, digest: digest(request) })
+        let (points, most_s) = (request.points.as_slice(), settings.limits.point_times_max_s);
+        let counts = |i: usize| filter.keeps(points[i]);
+        let times = request
+            .point_times
+            .as_ref()
+            .map(|times| times.relative_to_timestamp(counts, most_s))
+            .transpose()?;
+        let ends = RayEnds { points, times_s: times.as_ref().map(PointTimes::as_slice) };
+        let filtered = FilteredPoints::of(ends, filter, &request.robot, request.strict)?;
+        let digest = digest(request, times.as_ref());
+        Ok(Self { request, filtered, times, digest })
     }
 
     /// The scan as the core maps it.
@@ -46,7 +51,7 @@ impl<'a> FilteredScan<'a> {
             times_s: self.filtered.surroundings().times_s,
             no_returns: self.filtered.no_returns(),
             of_robot: self.filtered.of_robot(),
-            points_skipped: self.filtered.skipped,
+            points_skipped: self.filtered.skipped.total(),
             gravity: self.request.gravity,
             guess: self.request.guess,
             guess_covariance: self.request.guess_covariance,
@@ -56,9 +61,11 @@ impl<'a> FilteredScan<'a> {
         }
     }
 
-    /// Number of points that were left out.
-    pub(super) fn skipped(&self) -> usize {
-        self.filtered.skipped
+    /// How many points were left out, and those that lie beyond the map's range where the scan was found.
+    pub(super) fn skipped(&self, from_points: &LatticeFromPoints) -> SkippedPoints {
+        let surroundings = self.filtered.surroundings().points;
+        let beyond_map = surroundings.iter().filter(|&&point| from_points.index(point).is_none()).count();
+        SkippedPoints { beyond_map, ..self.filtered.skipped }
     }
 
     /// True of a point of the robot's surroundings.
@@ -89,7 +96,7 @@ impl From<MappingError> for ServiceError {
 }
 
 /// Tells one request from another under the same id: points, guess, and whether to align.
-fn digest(request: &ScanRequest) -> u64 {
+fn digest(request: &ScanRequest, times: Option<&PointTimes>) -> u64 {
     let guess = match &request.guess {
         Guess::Last | Guess::ConstantVelocity => Vec::new(),
         Guess::Pose(pose) | Guess::Motion(pose) => {
@@ -112,7 +119,7 @@ fn digest(request: &ScanRequest) -> u64 {
     let covariance = request.guess_covariance.map(|covariance| covariance.rows());
     let checksum =
         covariance.iter().fold(checksum, |sum, rows| crc32c::crc32c_append(sum, bytemuck::cast_slice(rows)));
-    let times = request.point_times.as_ref().map_or(&[][..], PointTimes::as_slice);
+    let times = times.map_or(&[][..], PointTimes::as_slice);
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(times));
     (request.points.len() as u64) << 32 | u64::from(checksum)
 }

@@ -19,6 +19,8 @@ use mrol_map::align::localize::{
 };
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapName;
+use mrol_map::mapping::MappingError;
+use mrol_map::scan::{PointFilter, SkippedPoints};
 use mrol_map::util::StopSignal;
 
 /// Share of the time limit after which a search ends, and what it found is refined.
@@ -54,7 +56,7 @@ pub struct LocalizationAnswer {
     pub cut_short: bool,
     /// What the search and the refinement took.
     pub search_time: Duration,
-    /// Points that were not finite.
+    /// Points that were not finite, or at 0 0 0.
     pub points_skipped: usize,
     /// The version of the map that was searched.
     pub version: MapVersion,
@@ -78,21 +80,21 @@ pub struct CandidateAnswer {
 }
 
 impl LocalizationAnswer {
-    /// The answer to a request of which `points_skipped` points were not finite.
+    /// The answer to a request of which some points were skipped.
     pub fn of(
         found: Localization,
-        points_skipped: usize,
+        skipped: &SkippedPoints,
         search_time: Duration,
         version: MapVersion,
     ) -> Self {
         Self {
             verdict: found.verdict,
-            reason: found.reason,
+            reason: skipped.explain(found.verdict == Verdict::Accepted, &found.reason),
             candidates: found.candidates.iter().map(CandidateAnswer::from).collect(),
             exhaustive: found.exhaustive,
             cut_short: found.cut_short,
             search_time,
-            points_skipped,
+            points_skipped: skipped.total(),
             version,
         }
     }
@@ -192,11 +194,11 @@ impl HostedMap {
         let stop = stop.by(start + limit);
         let all = request.points.as_slice();
         let _copy = budget.reserve_transient(size_of_val(all) as u64, WHOM)?;
-        let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
+        let skipped = SkippedPoints::of(all, &PointFilter::default());
+        let points: Vec<Point> =
+            all.iter().copied().filter(|point| PointFilter::default().keeps(*point)).collect();
         if points.is_empty() {
-            let message =
-                format!("none of the scan's {} points is finite: nothing but no-returns", all.len());
-            return Err(ServiceError::new(Reason::NoReturns, message));
+            return Err(MappingError::NoReturns { points: all.len(), zeros: skipped.zeros }.into());
         }
         let search = search_settings(settings.limits.localization_grid_bytes_max);
         let mut lent: Vec<Reservation> = Vec::new();
@@ -219,7 +221,7 @@ impl HostedMap {
             check_not_stopped(stop)?;
         }
         let version = self.version(found.version);
-        Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), version))
+        Ok(LocalizationAnswer::of(found, &skipped, start.elapsed(), version))
     }
 }
 

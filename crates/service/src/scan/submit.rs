@@ -143,7 +143,7 @@ impl HostedMap {
     /// The points of the scan in no occupied voxel of `level`.
     fn foreground(&self, scan: &FilteredScan<'_>, located: &LocatedScan, level: u32) -> Foreground {
         let all = scan.request.points.as_slice();
-        let times = scan.request.point_times.as_ref().zip(located.velocity.as_ref());
+        let times = scan.times.as_ref().zip(located.velocity.as_ref());
         let deskewed = times.map(|(times, velocity)| deskewed(all, times.as_slice(), velocity));
         let points = deskewed.as_deref().unwrap_or(all);
         let mut words = vec![0; all.len().div_ceil(64)];
@@ -269,10 +269,11 @@ impl HostedMap {
     /// What to say of a scan that was not added.
     fn answer(&self, scan: &FilteredScan<'_>, located: &LocatedScan) -> ScanAnswer {
         let alignment = &located.alignment;
+        let skipped = scan.skipped(&self.map.lattice().from_points(&alignment.map_from_sensor));
         ScanAnswer {
             accepted: alignment.verdict == Verdict::Accepted,
             verdict: alignment.verdict,
-            reason: alignment.reason.clone(),
+            reason: skipped.explain(alignment.verdict == Verdict::Accepted, &alignment.reason),
             map_from_sensor: alignment.map_from_sensor,
             level_overlaps: alignment.level_overlaps.clone(),
             inliers: alignment.inliers,
@@ -283,7 +284,7 @@ impl HostedMap {
             rivals: alignment.rivals.clone(),
             iterations: alignment.iterations,
             align_time: located.align_time,
-            points_skipped: scan.skipped(),
+            points_skipped: skipped.total(),
             new_voxels: 0,
             carved_voxels: 0,
             foreground: None,

@@ -113,20 +113,50 @@ impl DataDir {
         Ok(names == [map_files::snapshot_name(revision)])
     }
 
+    /// Names of the map files that the next start turns into maps, or refuses, sorted.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn file_names(&self) -> Result<Vec<MapName>, StoreError> {
+        let of_file = |entry: String| match Entry::of(&entry) {
+            Entry::MapFile(name) => Some(name),
+            _ => None,
+        };
+        let names: BTreeSet<MapName> = self.entries()?.into_iter().filter_map(of_file).collect();
+        Ok(names.into_iter().collect())
+    }
+
+    /// The path of the map file of that name, and the snapshot that it holds, which may become a map of the folder.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is damaged, or there is another map of the name.
+    pub(crate) fn read_file(
+        &self,
+        name: &MapName,
+        stop: StopSignal<'_>,
+    ) -> Result<(PathBuf, Snapshot), StoreError> {
+        let file = self.maps.join(Entry::file_name(name));
+        let snapshot = Snapshot::read_until(&*self.files, &file, stop)?;
+        let taken = Entry::folder_name(name, snapshot.uuid);
+        let folders = self.folders_of(name)?;
+        if folders.is_empty()
+            || folders.contains(&taken) && self.holds_only(&taken, snapshot.contents.revision)?
+        {
+            return Ok((file, snapshot));
+        }
+        let reason = format!(
+            "map {name} exists already: rename the file, move it away, or `mrol restore --replace` it"
+        );
+        Err(StoreError::damaged(&file, reason))
+    }
+
     /// Turns a map file into a map's folder.
     fn take_in(&self, name: &MapName, progress: &OpeningProgress) -> Result<(), StoreError> {
         let is_cancelled = || progress.is_cancelled();
-        let (file, stop) = (self.maps.join(Entry::file_name(name)), StopSignal::when(&is_cancelled));
-        let snapshot = Snapshot::read_until(&*self.files, &file, stop)?;
-        let taken = Entry::folder_name(name, snapshot.uuid);
-        let folders: BTreeSet<String> = self.folders_of(name)?.into_iter().collect();
-        if folders.is_empty() {
-            self.make(&taken, &snapshot, None, stop)?;
-        } else if !folders.contains(&taken) || !self.holds_only(&taken, snapshot.contents.revision)? {
-            let reason = format!(
-                "map {name} exists already: rename the file, move it away, or `mrol restore --replace` it"
-            );
-            return Err(StoreError::damaged(&file, reason));
+        let stop = StopSignal::when(&is_cancelled);
+        let (file, snapshot) = self.read_file(name, stop)?;
+        if self.folders_of(name)?.is_empty() {
+            self.make(&Entry::folder_name(name, snapshot.uuid), &snapshot, None, stop)?;
         }
         // Where a crash came between the two, the folder holds what the file does, and only the file has to go.
         let removed = self.files.remove(&file).and_then(|()| self.files.sync(&self.maps));

@@ -59,6 +59,27 @@ pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreEr
     Ok(diagnosis)
 }
 
+/// Checks a map file, which the next start of a server turns into a map: of the first format, or put there by hand.
+/// Changes nothing.
+///
+/// # Errors
+/// When the system refuses. Problems with the file are in the diagnosis.
+pub fn diagnose_file(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreError> {
+    let snapshot = match data_dir.read_file(name, StopSignal::NEVER) {
+        Ok((_, snapshot)) => snapshot,
+        Err(error @ StoreError::Io { .. }) => return Err(error),
+        Err(error) => return Ok(Diagnosis::of_problem(&error)),
+    };
+    let revision = snapshot.contents.revision;
+    let mut diagnosis =
+        Diagnosis { snapshots: vec![revision], revision: Some(revision), ..Diagnosis::default() };
+    match snapshot.restore() {
+        Ok(map) => (diagnosis.voxels, diagnosis.viewpoints) = (map.voxels(0), map.viewpoints().len()),
+        Err(error) => diagnosis.problems.push(error.to_string()),
+    }
+    Ok(diagnosis)
+}
+
 fn aside_files(files: &dyn FileSystem, path: &Path) -> Result<Vec<AsideFile>, StoreError> {
     let file = |name: String| {
         let bytes = files.size(&path.join(&name)).map_err(StoreError::io(path.join(&name)))?;

@@ -7,6 +7,6 @@ mod set_aside;
 #[cfg(test)]
 mod tests;
 
-pub use diagnose::diagnose;
+pub use diagnose::{diagnose, diagnose_file};
 pub use diagnosis::{AsideFile, Diagnosis};
 pub use set_aside::{SetAside, set_aside};

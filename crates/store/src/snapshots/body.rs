@@ -15,8 +15,8 @@ use crate::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::pb;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{
-    CompletedRequest, IdempotencyLog, KEEP_OUTS_MAX, KeepOut, KeepOuts, MapContents, MapSettings, MappedScan,
-    REQUESTS_KEPT, Trajectory,
+    CompletedRequest, IdempotencyLog, KEEP_OUTS_MAX, KeepOut, KeepOuts, MapContents, MapOrigin, MapSettings,
+    MappedScan, REQUESTS_KEPT, Trajectory,
 };
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::{BLOCKS_PER_LOOK, BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
@@ -41,6 +41,7 @@ pub(super) mod number {
     pub(in crate::snapshots) const NO_FILTER: u64 = 16;
     pub(in crate::snapshots) const NO_MOMENTS: u64 = 17;
     pub(in crate::snapshots) const VIEWPOINTS: u64 = 18;
+    pub(in crate::snapshots) const ORIGIN: u64 = 19;
 
     /// Field of `Voxels` and of `Moments`.
     pub(in crate::snapshots) const KEY_GAPS: u64 = 1;
@@ -90,6 +91,7 @@ pub(super) struct Body<'a> {
     hashes: u32,
     no_filter: bool,
     no_moments: bool,
+    origin: Option<&'a [u8]>,
     revision: u64,
     block_keys: &'a [u8],
     block_masks: &'a [u8],
@@ -117,6 +119,7 @@ impl<'a> Body<'a> {
             hashes: 0,
             no_filter: false,
             no_moments: false,
+            origin: None,
             revision: 0,
             block_keys: &[],
             block_masks: &[],
@@ -161,7 +164,8 @@ impl<'a> Body<'a> {
             (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
             (number::KEEP_OUTS, Bytes(_)) => self.keep_outs += 1,
             (number::VIEWPOINTS, Bytes(_)) => {}
-            (known @ number::UUID..=number::VIEWPOINTS, _) => {
+            (number::ORIGIN, Bytes(origin)) if self.origin.is_none() => self.origin = Some(origin),
+            (known @ number::UUID..=number::ORIGIN, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // A field of a newer version, which is reported where it matters.
@@ -202,8 +206,18 @@ impl<'a> Body<'a> {
         let [resolution_m, bits_per_key] = self.settings;
         let filter = FilterSettings { hashes: self.hashes, bits_per_key };
         let filter = (!self.no_filter).then_some(filter);
-        let settings = MapSettings { resolution_m, levels: self.levels, filter, moments: !self.no_moments };
+        let (levels, moments, origin) = (self.levels, !self.no_moments, self.origin()?);
+        let settings = MapSettings { resolution_m, levels, filter, moments, origin };
         settings.checked().map_err(|e| e.to_string())
+    }
+
+    fn origin(&self) -> Result<Option<MapOrigin>, Unreadable> {
+        let Some(bytes) = self.origin else { return Ok(None) };
+        let pb::MapOrigin { position_m } =
+            pb::MapOrigin::decode(bytes).map_err(|e| format!("origin: {e}"))?;
+        let position_m = <[f64; 3]>::try_from(position_m)
+            .map_err(|numbers| format!("origin: {} numbers, 3 are needed", numbers.len()))?;
+        MapOrigin::new(position_m).map(Some).map_err(|e| e.to_string())
     }
 
     fn check_counts<E>(&self, limits: &MapFileLimits) -> Result<(), MapFileError<E>> {

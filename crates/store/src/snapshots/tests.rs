@@ -20,7 +20,7 @@ use crate::viewpoint_parts::{PartUse, section_of, uses_in};
 use mrol_map::geometry::{self, Point};
 use mrol_map::map::{
     CallerName, CompletedRequest, ForgottenIds, KeepOut, KeepOutName, KeepOutShape, KeepOuts, MapContents,
-    MapSettings, MappedScan, MultiResolutionMap, Prism, Region, RequestId, RequestKind, RobotName,
+    MapOrigin, MapSettings, MappedScan, MultiResolutionMap, Prism, Region, RequestId, RequestKind, RobotName,
     SessionName, Trajectory, WithdrawnChange,
 };
 use mrol_map::util::StopSignal;
@@ -145,13 +145,36 @@ fn message(snapshot: &Snapshot) -> pb::Snapshot {
         no_filter: snapshot.settings.filter.is_none(),
         no_moments: !snapshot.settings.moments,
         viewpoints: viewpoints.iter().map(|(revision, it)| (revision, &**it).into()).collect(),
+        origin: snapshot
+            .settings
+            .origin
+            .map(|origin| pb::MapOrigin { position_m: origin.position_m.to_vec() }),
+    }
+}
+
+/// The snapshot of a map of a survey.
+fn surveyed() -> Snapshot {
+    let Snapshot { uuid, settings, contents } = snapshot();
+    let origin = Some(MapOrigin::new([388_096.123_456_789, 3_948_996.0, -0.5]).unwrap());
+    Snapshot { uuid, settings: MapSettings { origin, ..settings }, contents }
+}
+
+#[test]
+fn the_origin_of_a_map_is_kept_to_the_last_bit_and_a_broken_one_is_refused() {
+    let again = Snapshot::decode(&surveyed().encode().unwrap()).unwrap();
+    assert!(again == surveyed());
+    assert_eq!(again.restore().unwrap().settings().origin, surveyed().settings.origin);
+    for position_m in [vec![], vec![1.0; 4], vec![f64::NAN; 3]] {
+        let origin = Some(pb::MapOrigin { position_m });
+        let error = read(&pb::Snapshot { origin, ..message(&snapshot()) }).unwrap_err();
+        assert!(format!("{error:?}").contains("origin"), "{error:?}");
     }
 }
 
 #[test]
 fn a_body_is_written_as_the_message_that_it_is() {
     let contents = MapContents::default();
-    for snapshot in [snapshot(), Snapshot { contents, ..snapshot() }, query_only(true, true)] {
+    for snapshot in [snapshot(), surveyed(), Snapshot { contents, ..snapshot() }, query_only(true, true)] {
         let body = body_of(&snapshot, &snapshot.contents.viewpoints, StopSignal::NEVER);
         assert!(body == message(&snapshot).encode_to_vec());
     }

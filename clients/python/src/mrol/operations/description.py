@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fields import Fields
+from .._fields import F64, Fields
 from ..errors import BadAnswer
 from ..pose import Pose, pose_in
 from ..version import Version, Versioned
@@ -69,6 +69,8 @@ class MapInfo(Versioned):
     filter: FilterSettings | None
     moments: bool
     """Whether scans are aligned to surfaces; without moments by overlap alone."""
+    origin_m: F64 | None
+    """Where the map's origin lies in the frame of a survey, x y z: a place p of the map is at p + origin_m there."""
     levels: tuple[Level, ...]
     """The levels, finest first."""
     scans: int
@@ -109,6 +111,7 @@ def map_info(fields: Fields) -> MapInfo:
         resolution_m=settings.number("resolution_m"),
         filter=_filter(settings),
         moments=settings.flag("moments"),
+        origin_m=settings.numbers("origin_m", (3,)) if settings.has("origin_m") else None,
         levels=tuple(_level(of) for of in fields.objects("levels")),
         scans=fields.whole("scans"),
         robots=fields.texts("robots"),

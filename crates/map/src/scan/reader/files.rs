@@ -4,6 +4,9 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use nalgebra::Point3;
+
+use super::coordinates::Coordinates;
 use super::error::ReadError;
 use super::format::Format;
 use super::supported::FILE_BYTES_MAX;
@@ -12,13 +15,26 @@ use crate::geometry::Point;
 /// The points of the scan file at `path`, in the sensor frame, meters.
 ///
 /// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
-/// binary, binary_compressed), `.xyz` (text: the first three columns, divided by spaces or commas, `#` starts a
-/// comment), `.f32` (raw little-endian x y z). Points that are not finite are kept: they mean "no return".
+/// binary, binary_compressed), `.xyz` (text: the first three columns, or those that a line of names says, divided by
+/// spaces, commas or semicolons; `#`, `//` or `%` starts a comment), `.f32` (raw little-endian x y z). Points that
+/// are not finite are kept: they mean "no return". Coordinates are rounded to f32, see [`read_exact_points`].
 ///
 /// # Errors
 /// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
 /// the error names the file and the line, byte or element.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
+    read(path)
+}
+
+/// The points of [`read_points`] in double precision, as files in survey coordinates have them.
+///
+/// # Errors
+/// Those of [`read_points`].
+pub fn read_exact_points(path: &Path) -> Result<Vec<Point3<f64>>, ReadError> {
+    read(path)
+}
+
+fn read<C: Coordinates>(path: &Path) -> Result<Vec<C>, ReadError> {
     let format = Format::named_by(path)?;
     let bytes = read_file(path)?;
     format.points(&bytes).map_err(|problem| problem.in_file(path))

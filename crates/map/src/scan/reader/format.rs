@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::coordinates::Coordinates;
 use super::error::{Problem, ReadError};
 use super::{pcd, ply, text};
 use crate::geometry::Point;
@@ -35,7 +36,7 @@ impl Format {
         }
     }
 
-    pub(super) fn points(self, bytes: &[u8]) -> Result<Vec<Point>, Problem> {
+    pub(super) fn points<C: Coordinates>(self, bytes: &[u8]) -> Result<Vec<C>, Problem> {
         match self {
             Self::Ply => ply::points(bytes),
             Self::Pcd => pcd::points(bytes),
@@ -45,13 +46,13 @@ impl Format {
     }
 }
 
-fn packed_points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
-    let points = bytemuck::try_cast_slice(bytes).map_err(|_| {
+fn packed_points<C: Coordinates>(bytes: &[u8]) -> Result<Vec<C>, Problem> {
+    let points: &[Point] = bytemuck::try_cast_slice(bytes).map_err(|_| {
         let (size, whole) = (Point::BYTES, bytes.len() / Point::BYTES);
         Problem::new(format!(
             "{} bytes are not whole points of {size} bytes, point {whole} is cut short",
             bytes.len()
         ))
     })?;
-    Ok(points.to_vec())
+    Ok(points.iter().map(|point| C::of_singles(point.xyz())).collect())
 }

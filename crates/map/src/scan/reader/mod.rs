@@ -4,10 +4,12 @@
 //! that are there, before anything is allocated for it.
 
 mod axis;
+mod coordinates;
 mod count;
 mod error;
 mod files;
 mod format;
+mod lines;
 mod pcd;
 mod ply;
 mod supported;
@@ -18,5 +20,6 @@ mod text;
 pub(super) use error::Problem;
 pub use error::ReadError;
 pub(super) use files::read_file;
-pub use files::{parse_points, read_points, scan_files};
-pub(super) use text::{lines, number};
+pub use files::{parse_points, read_exact_points, read_points, scan_files};
+pub(super) use lines::content_lines;
+pub(super) use text::number;

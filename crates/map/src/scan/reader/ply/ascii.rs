@@ -1,61 +1,67 @@
 //! Ascii elements of `.ply` files, one a line.
-//!
-//! They are not left to ply-rs-bw, whose grammar refuses `nan`, `inf`, `.5` and `5.`.
 
-use ply_rs_bw::ply::{ElementDef, Header, PropertyDef, PropertyType};
+use super::header::{Element, Header, Kind};
+use super::vertex::{Vertex, before_vertex};
+use crate::scan::reader::coordinates::Coordinates;
+use crate::scan::reader::count::check_count;
+use crate::scan::reader::error::{Problem, quoted};
+use crate::scan::reader::lines::{Lines, content};
+use crate::scan::reader::text::number;
 
-use super::vertex::{before_vertex, check_element};
-use crate::geometry::Point;
-use crate::scan::reader::axis::axis;
-use crate::scan::reader::error::Problem;
-use crate::scan::reader::text::{lines, number};
+/// Fewest bytes of one value: a digit and a separator.
+const VALUE_BYTES_MIN: u64 = 2;
 
-/// How the tokens of an ascii property are read.
+/// How the tokens of a property are read.
 enum Column {
     Axis(usize),
     Other,
     List,
 }
 
-/// The points of an ascii payload, whose first line has the number `first_line`.
-pub(super) fn points(
+/// The points in the lines after the header.
+pub(super) fn points<C: Coordinates>(
     header: &Header,
-    vertex: &ElementDef,
-    payload: &[u8],
-    first_line: usize,
-) -> Result<Vec<Point>, Problem> {
-    for element in before_vertex(header).chain([vertex]) {
-        // The last line need not end.
-        check_element(element, header.encoding, payload.len() + 1)?;
+    vertex: &Vertex<'_>,
+    lines: Lines<'_>,
+) -> Result<Vec<C>, Problem> {
+    let mut before = 0usize;
+    for element in before_vertex(header) {
+        check(element, &lines)?;
+        before += element.count;
     }
-    let before: usize = before_vertex(header).map(|element| element.count).sum();
-    let columns = columns(vertex);
-    let lines = lines(payload, first_line).skip(before).take(vertex.count);
-    let point = |(line, text): (usize, &str)| {
-        ascii_point(&columns, text).map_err(|problem| Problem::at_line(line, problem))
+    check(vertex.element, &lines)?;
+    let (columns, count) = (columns(vertex), vertex.element.count);
+    let entries = content(lines).skip(before).take(count);
+    let point = |(line, text): (usize, std::borrow::Cow<'_, str>)| {
+        point(&columns, &text).map(C::of_doubles).map_err(|problem| Problem::at_line(line, problem))
     };
-    let points: Vec<Point> = lines.map(|line| line.and_then(point)).collect::<Result<_, _>>()?;
-    if points.len() < vertex.count {
-        return Err(Problem::new(format!(
-            "truncated: {} of {} \"vertex\" elements",
-            points.len(),
-            vertex.count
-        )));
+    let points: Vec<C> = entries.map(point).collect::<Result<_, _>>()?;
+    match points.len() == count {
+        true => Ok(points),
+        false => Err(Problem::new(format!("truncated: {} of {count} \"vertex\" elements", points.len()))),
     }
-    Ok(points)
 }
 
-fn columns(vertex: &ElementDef) -> Vec<Column> {
-    let column = |(name, property): (&String, &PropertyDef)| match property.data_type {
-        PropertyType::List(..) => Column::List,
-        PropertyType::Scalar(_) => axis(name).map_or(Column::Other, Column::Axis),
-    };
-    vertex.properties.iter().map(column).collect()
+/// Checks the count of an element against the bytes in which it lies.
+fn check(element: &Element, lines: &Lines<'_>) -> Result<(), Problem> {
+    let bytes = element.properties.len() as u64 * VALUE_BYTES_MIN;
+    // The last line need not end.
+    let have = lines.rest().len() + 1;
+    check_count(&format!("{} elements", quoted(&element.name)), element.count as u64, bytes, have)
 }
 
-fn ascii_point(columns: &[Column], text: &str) -> Result<Point, String> {
+fn columns(vertex: &Vertex<'_>) -> Vec<Column> {
+    let properties = vertex.element.properties.iter().enumerate();
+    let column = |(place, property): (usize, &super::header::Property)| match property.kind {
+        Kind::List(..) => Column::List,
+        Kind::Scalar(_) => vertex.axis(place).map_or(Column::Other, Column::Axis),
+    };
+    properties.map(column).collect()
+}
+
+fn point(columns: &[Column], text: &str) -> Result<[f64; 3], String> {
     let mut tokens = text.split_ascii_whitespace();
-    let mut xyz = [f32::NAN; 3];
+    let mut xyz = [f64::NAN; 3];
     for column in columns {
         let token = tokens.next().ok_or_else(|| format!("fewer values than {} properties", columns.len()))?;
         match column {
@@ -64,7 +70,7 @@ fn ascii_point(columns: &[Column], text: &str) -> Result<Point, String> {
             Column::List => skip_list(&mut tokens, number(token)?),
         }
     }
-    Ok(xyz.into())
+    Ok(xyz)
 }
 
 fn skip_list<'a>(tokens: &mut impl Iterator<Item = &'a str>, length: usize) {

@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::files::*;
+use crate::geometry::Point;
 use crate::scan::reader::format::Format;
 use crate::scan::reader::supported::EXTENSIONS;
 
@@ -14,7 +15,7 @@ fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {
     for (extension, bytes) in every_format() {
         let format = Format::of(Path::new(&format!("a.{extension}"))).unwrap();
         for end in 0..bytes.len() {
-            if let Ok(points) = format.points(&bytes[..end]) {
+            if let Ok(points) = format.points::<Point>(&bytes[..end]) {
                 let declared = matches!(format, Format::Ply | Format::Pcd);
                 let last_line = end + 8 > bytes.len();
                 assert!(!declared || last_line, "{end} of {} bytes of {extension}", bytes.len());
@@ -36,7 +37,7 @@ fn garbage_in_any_place_never_panics() {
             for _ in 0..rng.random_range(1..6) {
                 broken[rng.random_range(0..end)] = garbage(&mut rng);
             }
-            let _ = format.points(&broken);
+            let _ = format.points::<Point>(&broken);
         }
     }
 }
@@ -53,7 +54,7 @@ fn bytes_of_no_format_never_panic() {
         let format = Format::of(Path::new(&format!("a{extension}"))).unwrap();
         for length in 0..500 {
             let bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
-            let _ = format.points(&bytes);
+            let _ = format.points::<Point>(&bytes);
         }
     }
 }

@@ -10,15 +10,18 @@ fn an_error_names_line_or_element_and_what_is_needed() {
     for (error, expected) in [
         (error("xyz", b"1 2 3\n# c\n4 5\n"), "scan.xyz:3: 2 columns, x y z are needed"),
         (error("xyz", b"1,2,3\n1,,2,3\n"), "scan.xyz:2: \"\" is not a number"),
-        (error("xyz", b"X Y Z\n"), "scan.xyz:1: \"X\" is not a number (a comment starts with #)"),
+        (error("xyz", b"X Y W\n"), "scan.xyz:1: \"X\" is not a number (a comment starts with #)"),
         (error("xyz", b"1 2 3\n\xff\xfe\n"), "scan.xyz:2: not text"),
         (error("f32", &[0; 30]), "30 bytes are not whole points of 12 bytes, point 2"),
         (error("ply", b"solid\n"), "scan.ply:1: not a ply header"),
         (error("ply", b""), "not a ply header"),
         (ply("element vertex 50", "element vertex -4"), "\"element vertex -4"),
-        (ply("property float x", "property int x"), "property x of element vertex is Scalar(Int)"),
+        (
+            ply("property float x", "property int x"),
+            "scan.ply:8: property \"x\": it is Int, float or double is needed",
+        ),
         (ply("property float x", "property float u"), "no property x"),
-        (ply("property float x", "property float z"), "twice"),
+        (ply("property double y", "property double x"), "property x twice"),
         (ply("element camera", "element face"), "twice"),
         (ply("element vertex", "element points"), "no element vertex"),
         (ply("0.6666667", "oops"), "scan.ply:18: \"oops\" is not a number"),
@@ -35,10 +38,10 @@ fn a_pcd_error_names_the_field_or_the_point() {
     };
     for (error, expected) in [
         (pcd("FIELDS rgb x", "FIELDS rgb u"), "no field x"),
-        (pcd("SIZE 4 4 8", "SIZE 4 2 8"), "F with size 2"),
-        (pcd("COUNT 1 1 1 1 2", "COUNT 1 1 3 1 2"), "field y is 3 of F64"),
+        (pcd("SIZE 4 4 8", "SIZE 4 2 8"), "field x is 1 of type F and size 2"),
+        (pcd("COUNT 1 1 1 1 2", "COUNT 1 1 3 1 2"), "field y is 3 of type F and size 8"),
         (pcd("COUNT 1 1 1 1 2", "COUNT 18446744073709551615 1 1 1 18446744073709551615"), "2^64"),
-        (pcd("0.6666667", "oops"), "point 2 of 50: \"oops\" is not a number"),
+        (pcd("0.6666667", "oops"), "scan.pcd:14: point 2 of 50: \"oops\" is not a number"),
         (pcd("0.6666667", ""), "point 2 of 50: fewer values"),
     ] {
         assert!(error.contains(expected), "{error:?} should contain {expected:?}");

@@ -4,3 +4,5 @@ mod broken;
 mod files;
 mod formats;
 mod messages;
+mod odd_headers;
+mod odd_text;
