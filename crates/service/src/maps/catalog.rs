@@ -343,9 +343,8 @@ fn description(settings: &MapSettings) -> String {
         format!("filter_hashes {hashes}, filter_bits_per_key {bits_per_key}")
     });
     let moments = if *moments { "moments" } else { "no moments" };
-    let origin =
-        origin.map_or("no origin_m".to_owned(), |origin| format!("origin_m {:?}", origin.position_m));
-    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}, {origin}")
+    let origin = origin.map_or(String::new(), |origin| format!(", origin_m {:?}", origin.position_m));
+    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}{origin}")
 }
 
 #[cfg(test)]
