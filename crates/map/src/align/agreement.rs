@@ -6,23 +6,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
-
 use super::sampled_scan::SampledScan;
-use super::witnesses::{MetInMap, Witnesses};
 use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
-use crate::util::StopSignal;
 use crate::visibility::{ScanImage, Sight, Viewpoint, ViewpointSet};
 
 /// Points of the scan that are looked for in the images of viewpoints.
 const POINTS: usize = 800;
 /// Depths that differ by so many r_0 are the same.
 const TOLERANCE: f64 = 2.0;
-/// How many times the deviation of as many single points the difference between two poses has that are equal in truth: points beside
-/// each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays.
-const CLUSTERING: f64 = 1.6;
-
 /// What rays of one side say of a pose: a number of points that were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {
@@ -55,17 +47,10 @@ pub struct Rival {
 /// What is asked of the rays of a scan, made once for all poses.
 #[derive(Debug)]
 pub(super) struct Rays {
-    image: ScanImage,
+    pub(super) image: ScanImage,
     pub(super) points: Vec<Point>,
     pub(super) viewpoints: Arc<ViewpointSet>,
     pub(super) tolerance_m: f32,
-}
-
-/// What each point says of a scan at a pose: those of the scan, and those that the witnesses met.
-#[derive(Debug)]
-pub(super) struct Look {
-    of_scan: Vec<Sight>,
-    of_map: Vec<Sight>,
 }
 
 impl RayCounts {
@@ -118,23 +103,6 @@ impl Rays {
         Self { image: ScanImage::of(scan.points), points, viewpoints: map.viewpoints(), tolerance_m }
     }
 
-    /// What the rays say of the scan at a pose. Once `stop` is set, nothing.
-    pub(super) fn look(&self, pose: &Pose, witnesses: &Witnesses, stop: StopSignal<'_>) -> Look {
-        if stop.is_stopped() {
-            return Look { of_scan: Vec::new(), of_map: Vec::new() };
-        }
-        let of_scan = self.points.iter().map(|point| {
-            let sights = witnesses.viewpoints.iter().map(|viewpoint| self.sight_of(viewpoint, pose, *point));
-            majority(sights)
-        });
-        let sensor_from_map = pose.inverse();
-        let of_map = witnesses.met.iter().map(|&MetInMap { place_m, error_m }| {
-            let offset = sensor_from_map * Point3::from(place_m);
-            self.image.sight(offset.coords.map(|c| c as f32).into(), self.tolerance_m + error_m)
-        });
-        Look { of_scan: of_scan.collect(), of_map: of_map.collect() }
-    }
-
     /// What a viewpoint says of a point of the scan at a pose.
     pub(super) fn sight_of(&self, viewpoint: &Viewpoint, pose: &Pose, point: Point) -> Sight {
         let place = pose * point.to_f64();
@@ -142,207 +110,7 @@ impl Rays {
     }
 }
 
-impl Look {
-    /// How many points agree, and how many are contradicted.
-    pub(super) fn agreement(&self) -> RayAgreement {
-        // New ground is what the scan shows and nobody saw; what it does not look at is nothing to it.
-        let in_view = self.of_map.iter().copied().filter(|sight| *sight != Sight::NotSeen);
-        RayAgreement { of_scan: RayCounts::of(self.of_scan.iter().copied()), of_map: RayCounts::of(in_view) }
-    }
-
-    /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of the difference
-    /// between two poses that are equal in truth: z = (a - b) / sqrt(a + b) / [`CLUSTERING`], of the points that contradict here
-    /// alone (a) and there alone (b).
-    pub(super) fn contradicted_more_than(&self, other: &Self) -> f64 {
-        let pairs = self.of_scan.iter().zip(&other.of_scan).chain(self.of_map.iter().zip(&other.of_map));
-        let (here, there) = pairs.fold((0.0, 0.0), |(here, there), (a, b)| {
-            match (*a == Sight::Contradicts, *b == Sight::Contradicts) {
-                (true, false) => (here + 1.0, there),
-                (false, true) => (here, there + 1.0),
-                _ => (here, there),
-            }
-        });
-        if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) / CLUSTERING }
-    }
-}
-
-/// What most of those say that say anything; agreement of as many as contradict.
-fn majority(sights: impl Iterator<Item = Sight>) -> Sight {
-    let (agree, contradict) = sights.fold((0, 0), |(agree, contradict), sight| match sight {
-        Sight::Agrees => (agree + 1, contradict),
-        Sight::Contradicts => (agree, contradict + 1),
-        Sight::Hidden | Sight::NotSeen => (agree, contradict),
-    });
-    match (agree, contradict) {
-        (0, 0) => Sight::NotSeen,
-        _ if agree >= contradict => Sight::Agrees,
-        _ => Sight::Contradicts,
-    }
-}
-
 /// Some of the points, from all over a sample.
 pub(super) fn spread(points: &[Point], wish: usize) -> Vec<Point> {
     points.iter().step_by(points.len().div_ceil(wish).max(1)).copied().collect()
-}
-
-/// How the rays of a scan of `points` (sensor frame, meters) at a pose and those of the map's viewpoints agree.
-pub fn ray_agreement(
-    map: &MultiResolutionMap,
-    points: &[Point],
-    map_from_sensor: &Pose,
-    settings: &super::AlignmentSettings,
-) -> RayAgreement {
-    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, StopSignal::NEVER);
-    let rays = Rays::of(map, &scan);
-    let witnesses = Witnesses::of(&rays, map, &[*map_from_sensor], StopSignal::NEVER);
-    rays.look(map_from_sensor, &witnesses, StopSignal::NEVER).agreement()
-}
-
-#[cfg(test)]
-mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    use super::*;
-    use crate::align::AlignmentSettings;
-    use crate::map::{MapSettings, RobotName};
-    use crate::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings, ViewpointSettings};
-
-    /// A scan from (x, y) in a room of 8 x 6 m about the origin with a pillar, a ray every `step_deg`; sensor frame.
-    fn scan(x: f32, y: f32, step_deg: f32) -> Vec<Point> {
-        scan_of(&[(2.0, 1.5)], x, y, step_deg)
-    }
-
-    /// [`scan`] with pillars, 0.8 m wide, at the given places.
-    fn scan_of(pillars: &[(f32, f32)], x: f32, y: f32, step_deg: f32) -> Vec<Point> {
-        let steps = |from: f32, to: f32| {
-            let count = ((to - from) / step_deg) as i32;
-            (0..count).map(move |i| (from + i as f32 * step_deg).to_radians())
-        };
-        let rays = steps(-20.0, 20.0).flat_map(|elevation| steps(0.0, 360.0).map(move |at| (elevation, at)));
-        rays.map(|(elevation, azimuth)| {
-            let (sin, cos) = azimuth.sin_cos();
-            let wall = |half: f32, from: f32, along: f32| (half.copysign(along) - from) / along;
-            let to_pillar = |&(at_x, at_y): &(f32, f32)| {
-                let (dx, dy) = (at_x - x, at_y - y);
-                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
-                let is_met = along > 0.0 && aside.abs() < 0.4;
-                if is_met { along - (0.16 - aside * aside).sqrt() } else { f32::MAX }
-            };
-            let pillar = pillars.iter().map(to_pillar).fold(f32::MAX, f32::min);
-            let range = wall(4.0, x, cos).min(wall(3.0, y, sin)).min(pillar);
-            Point::new(range * cos, range * sin, range * elevation.tan())
-        })
-        .collect()
-    }
-
-    /// A map of scans from the places of `places`, whose rays lie `step_deg` apart.
-    fn map_of(places: &[(f32, f32)], resolution_m: f64, step_deg: f32) -> MultiResolutionMap {
-        let scans = places.iter().map(|&(x, y)| (scan(x, y, step_deg), x, y));
-        map_with(scans.collect(), resolution_m)
-    }
-
-    /// A map of scans that were taken, not turned, at (x, y).
-    fn map_with(scans: Vec<(Vec<Point>, f32, f32)>, resolution_m: f64) -> MultiResolutionMap {
-        let map = MultiResolutionMap::new(MapSettings::new(resolution_m, 5)).unwrap();
-        let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
-        let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
-        for (points, x, y) in scans {
-            let pose = Pose::translation(x.into(), y.into(), 0.0);
-            let scan = Scan { guess: Guess::Pose(pose), at_guess: true, ..Scan::new(&robot, &points) };
-            mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
-        }
-        map
-    }
-
-    #[test]
-    fn a_true_pose_agrees_whatever_the_voxels_the_rays_and_the_number_of_scans() {
-        let places = [(-2.0, -1.0), (-1.0, 0.5), (0.0, -1.5), (1.0, 0.0), (2.5, -2.0)];
-        for resolution_m in [0.04, 0.1, 0.2] {
-            for step_deg in [0.5, 1.0, 2.0] {
-                for scans in [1, 2, places.len()] {
-                    let map = map_of(&places[..scans], resolution_m, step_deg);
-                    let points = scan(-0.5, 0.3, step_deg);
-                    let at = |pose: &Pose| ray_agreement(&map, &points, pose, &AlignmentSettings::default());
-                    let truth = at(&Pose::translation(-0.5, 0.3, 0.0));
-                    let of = format!("{resolution_m} m, {step_deg} deg, {scans} scans: {truth:?}");
-                    assert!(truth.worse() > 0.95 && truth.evidence() > 0.5, "{of}");
-                    let aside = at(&Pose::translation(-0.5 + 12.0 * resolution_m, 0.3, 0.0));
-                    assert!(aside.worse() < truth.worse() - 0.02, "{of}, aside {aside:?}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn poses_that_are_equal_in_truth_differ_by_the_deviation_that_is_counted_with() {
-        // In a crowd, three within 48 square meters, they differ by one and a half of it.
-        let (alone, one, crowd) = (deviation_of_equals(0), deviation_of_equals(1), deviation_of_equals(3));
-        assert!(
-            alone < 0.5 && (0.2..1.0).contains(&one) && (one..2.0).contains(&crowd),
-            "{alone} {one} {crowd}"
-        );
-    }
-
-    /// The root mean square of z between two poses in a room that looks the same from both, but for people, who stand elsewhere in each
-    /// of the scans. Noise of 2 cm.
-    fn deviation_of_equals(people: usize) -> f64 {
-        let mut random = ChaCha8Rng::seed_from_u64(1);
-        let mut of_people = |people: usize, x: f32, y: f32| {
-            let mut at = |half: f32| random.random_range(-half..half);
-            let free = |(at_x, at_y): &(f32, f32)| (at_x - x).hypot(at_y - y) > 1.0;
-            let pillars: Vec<_> = (0..people).map(|_| (at(3.5), at(2.5))).filter(free).collect();
-            let mut points = scan_of(&pillars, x, y, 1.0);
-            points.iter_mut().for_each(|point| {
-                let scale = 1.0 + random.random_range(-0.02..0.02) / point.to_f64().coords.norm() as f32;
-                *point = Point::from(point.xyz().map(|c| c * scale));
-            });
-            points
-        };
-        let mut squares = Vec::new();
-        for k in 0..40 {
-            let (x, y) = (f32::from(k as u8 % 8) * 0.5 - 1.7, f32::from(k as u8 / 8) * 0.6 - 1.3);
-            let places = [(-2.0, -1.0), (-1.0, 1.5), (1.0, 0.0), (2.5, -2.0)];
-            let scans = places.map(|(x, y)| (of_people(people, x, y), x, y));
-            let map = map_with(scans.to_vec(), 0.1);
-            let points = of_people(people, x, y);
-            let settings = AlignmentSettings::default();
-            let scan = SampledScan::new(&points, map.lattice().extent_m(), &settings, StopSignal::NEVER);
-            let (x, y) = (f64::from(x), f64::from(y));
-            let turn = nalgebra::Vector3::z() * std::f64::consts::PI;
-            let poses = [Pose::translation(x, y, 0.0), Pose::new(nalgebra::Vector3::new(-x, -y, 0.0), turn)];
-            let rays = Rays::of(&map, &scan);
-            let witnesses = Witnesses::of(&rays, &map, &poses, StopSignal::NEVER);
-            let [truth, turned] = poses.map(|pose| rays.look(&pose, &witnesses, StopSignal::NEVER));
-            squares.push(truth.contradicted_more_than(&turned).powi(2));
-        }
-        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
-    }
-
-    #[test]
-    fn a_map_without_viewpoints_tells_what_its_scans_must_have_seen() {
-        let mut settings = MapSettings::new(0.1, 5);
-        settings.moments = true;
-        let map = MultiResolutionMap::new(settings).unwrap();
-        let (robot, sightings) = (RobotName::new("r").unwrap(), Sightings::default());
-        let viewpoints = ViewpointSettings { bytes_max: 0, ..ViewpointSettings::default() };
-        let mapper =
-            ScanMapper::new(&map, &sightings, MappingSettings { viewpoints, ..MappingSettings::default() });
-        for (x, y) in [(-2.0, -1.0), (0.0, 0.5), (1.5, -1.0)] {
-            let (points, pose) = (scan(x, y, 1.0), Pose::translation(x.into(), y.into(), 0.0));
-            let scan = Scan { guess: Guess::Pose(pose), at_guess: true, ..Scan::new(&robot, &points) };
-            mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
-        }
-        assert!(map.viewpoints().is_empty());
-        let points = scan(-0.5, 0.3, 1.0);
-        let at = |x: f64, y: f64, turn: f64| {
-            let pose = Pose::new(nalgebra::Vector3::new(x, y, 0.0), nalgebra::Vector3::z() * turn);
-            ray_agreement(&map, &points, &pose, &AlignmentSettings::default())
-        };
-        let truth = at(-0.5, 0.3, 0.0);
-        assert!(truth.worse() > 0.95 && truth.evidence() > 0.4, "{truth:?}");
-        let (aside, turned) = (at(0.7, 0.3, 0.0), at(0.5, -0.3, std::f64::consts::PI));
-        assert!(aside.better() < truth.worse() - 0.02, "{aside:?} {truth:?}");
-        assert!(turned.worse() < truth.worse(), "{turned:?} {truth:?}");
-    }
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::agreement::{Look, RayAgreement, Rays, Rival};
+use super::agreement::{RayAgreement, Rays, Rival};
+use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
 use super::verdict::{Alignment, Verdict};
@@ -21,10 +22,10 @@ const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since people and what was
 /// moved contradict one side only; farther away, where some pose of many fits by chance, of both.
 const AGREEMENT_MIN: f64 = 0.9;
-/// A pose is near its guess within so many meters, half a standard deviation of a guess of which nothing else is known, and a tilt of one,
+/// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing else is known, and a tilt of one,
 /// degrees; other places are looked for up to so many meters, three of them. Its yaw does not count: the robot may have been turned
 /// unseen.
-const NEAR_M: f64 = 0.5 * WIDE_M;
+const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
@@ -119,7 +120,8 @@ impl<'a> Ends<'a> {
 
     fn end(&self, alignment: Alignment) -> End {
         let pose = &alignment.map_from_sensor;
-        let (look, deviations) = (self.rays.look(pose, &self.witnesses, self.stop), self.deviations(pose));
+        let (look, deviations) =
+            (Look::of(self.rays, pose, &self.witnesses, self.stop), self.deviations(pose));
         let agreement = look.agreement();
         let against = self.reason_against(&alignment, &agreement);
         End { alignment, agreement, look, deviations, against }
@@ -199,17 +201,18 @@ impl<'a> Ends<'a> {
         let of_end =
             |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
         let guess = self.prior.map(|prior| prior.guess).filter(is_elsewhere).and_then(|map_from_sensor| {
-            let look = self.rays.look(&map_from_sensor, &self.witnesses, self.stop);
+            let look = Look::of(self.rays, &map_from_sensor, &self.witnesses, self.stop);
             let agreement = look.agreement();
+            let is_new_ground = !has_evidence(&agreement) && is_hardly_contradicted(&agreement);
             let is_as_likely = cost(0.0, &look, &preferred.look) - own <= RIVAL;
-            (!has_evidence(&agreement) && is_as_likely).then_some(Rival { map_from_sensor, agreement })
+            (is_new_ground && is_as_likely).then_some(Rival { map_from_sensor, agreement })
         });
         ends.map(of_end).chain(guess).collect()
     }
 
     /// How rays agree at some other pose.
     pub(super) fn agreement_at(&self, pose: &Pose) -> RayAgreement {
-        self.rays.look(pose, &self.witnesses, self.stop).agreement()
+        Look::of(self.rays, pose, &self.witnesses, self.stop).agreement()
     }
 
     /// The share of what each witness met that another one contradicts.
@@ -229,6 +232,11 @@ impl End {
     fn is_contradicted_more_than(&self, other: &Self) -> f64 {
         self.look.contradicted_more_than(&other.look)
     }
+}
+
+/// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is known.
+fn is_hardly_contradicted(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
+    of_scan.contradicted_share().min(of_map.contradicted_share()) <= 1.0 - AGREEMENT_MIN
 }
 
 /// True of a pose at which the scan and earlier scans saw enough of each other to be compared.

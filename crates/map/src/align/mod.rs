@@ -9,7 +9,8 @@
 //! sampled_scan    step 1                a volumetric sample (III-A)
 //! stages          steps 2 to 5          an ascent at each level (ascent, overlap), and the sub-voxel stage (refine)
 //! verdict                               whether to believe the pose (information, slide, prior)
-//! agreement       ray_agreement         whether rays of scan and map agree
+//! agreement       Rays, RayAgreement    the rays of a scan, and how many agree
+//! look            ray_agreement         what rays say of a scan at a pose, point by point
 //! witnesses                             which earlier scans are asked, and what they met
 //! marched                               what earlier scans must have seen, where they left no viewpoints
 //! rivals, ends    Contest, Ends         which of several ends to believe, by rays and by what is known beforehand
@@ -31,6 +32,7 @@ mod extent;
 mod gravity;
 mod information;
 pub mod localize;
+mod look;
 mod marched;
 mod multi_start;
 mod overlap;
@@ -47,8 +49,9 @@ mod tests;
 mod verdict;
 mod witnesses;
 
-pub use agreement::{RayAgreement, RayCounts, Rival, ray_agreement};
+pub use agreement::{RayAgreement, RayCounts, Rival};
 pub use information::{Direction, PoseInformation};
+pub use look::ray_agreement;
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
 pub use prior::{PoseCovariance, PoseCovarianceError, PosePrior};
 pub use sequential::{align, align_until, ascend, evaluate_at, evaluate_at_until};
