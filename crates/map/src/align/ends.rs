@@ -22,9 +22,9 @@ const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since people and what was
 /// moved contradict one side only; farther away, where some pose of many fits by chance, of both.
 const AGREEMENT_MIN: f64 = 0.9;
-/// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing else is known, and a tilt of one,
-/// degrees; other places are looked for up to so many meters, three of them. Its yaw does not count: the robot may have been turned
-/// unseen.
+/// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing else is known, and a
+/// tilt of one, degrees; other places are looked for up to so many meters, three of them. Its yaw does not count: the robot may have been
+/// turned unseen.
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
