@@ -278,7 +278,7 @@ def test_tls_is_checked_on_both_sides(tmp_path: Path, monkeypatch: pytest.Monkey
         address = server.address.replace("127.0.0.1", "localhost")
         shown = {"client_cert": client_pem, "client_key": client_key}
         m = mrol.connect(address, ca=pem, **shown).map("m", resolution=0.1)
-        assert m.insert([[x * 0.1, 0, 0] for x in range(100_000)], align=False).new_voxels == 100_000
+        assert m.insert([[x * 0.1 + 0.05, 0, 0] for x in range(100_000)], align=False).new_voxels == 100_000
         assert m.query([[x * 0.1 + 0.05, 0, 0] for x in range(100_000)]).count > 99_000
         monkeypatch.setenv("MROL_CA", str(pem))
         assert mrol.connect(f"https://{address}", **shown).map("m").describe().scans == 1

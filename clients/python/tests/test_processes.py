@@ -51,8 +51,8 @@ def must_end_well(child: int) -> None:
 
 def test_threads_share_a_map(empty: mrol.Map) -> None:
     def work(number: int) -> tuple[int | None, bool]:
-        scan = empty.insert([[number, 0, 0]], align=False, guess=np.eye(4), force=True)
-        return scan.scan_id, bool(empty.query([[number, 0, 0]], min_revision=scan.revision).occupied[0])
+        scan = empty.insert([[number, 1, 0]], align=False, guess=np.eye(4), force=True)
+        return scan.scan_id, bool(empty.query([[number, 1, 0]], min_revision=scan.revision).occupied[0])
 
     with ThreadPoolExecutor(8) as threads:
         done = list(threads.map(work, range(200)))
