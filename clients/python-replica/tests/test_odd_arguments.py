@@ -62,7 +62,7 @@ NAMED_OTHERWISE = {
 def local() -> mrol_replica.LocalMap:
     """A map without a server."""
     made = mrol_replica.LocalMap(0.1, levels=2)
-    made.insert(POINT, align=False)
+    made.insert([[0.01, 0.0, 0.0]], align=False)
     return made
 
 
