@@ -32,8 +32,8 @@ pub struct ReplicaOptions {
     pub viewpoint_bytes_max: usize,
     /// How long the server may be silent until the connection counts as lost: more than its `watch_heartbeat_s`. 35 s.
     pub silence_max: Duration,
-    /// How long ago the server may have been heard last for questions to be answered: more than its `watch_heartbeat_s`. Any
-    /// time without, which is the default: then whoever asks looks at [`Replica::age`](super::Replica::age).
+    /// How long ago the server may have been heard last for questions to be answered: more than its `watch_heartbeat_s`. Without a
+    /// limit, which is the default, answers may be of any age, and [`Replica::age`](super::Replica::age) tells it.
     pub age_max: Option<Duration>,
 }
 

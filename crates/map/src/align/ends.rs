@@ -183,11 +183,11 @@ impl<'a> Ends<'a> {
         best.or_else(|| self.all.iter().max_by(by_fitness)).unwrap_or(&self.all[0])
     }
 
-    /// What may as well be the truth as `best`: the ends elsewhere whose cost is little more, those that rays clearly prefer, since what
-    /// is known beforehand may be too sure of itself, and the guess itself, where the scan would show what nobody saw so far.
+    /// The rivals of `best`, other poses that may be the true one: ends elsewhere whose cost is little more; ends that rays clearly prefer,
+    /// since what is known beforehand may be too sure of itself; and the guess itself, where the scan would show new ground.
     ///
-    /// An end of which a direction is open is not believed, but it is possible. Of places other than the guess where the scan would show
-    /// new ground only, nothing is asked, since there are always some.
+    /// An end with an open direction is not believed, but it is possible. A pose elsewhere at which the scan would show new ground only is
+    /// no rival: there are always some.
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
         let own = best.cost(preferred);

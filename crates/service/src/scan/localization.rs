@@ -19,7 +19,6 @@ use mrol_map::align::localize::{
 };
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapName;
-use mrol_map::mapping::MappingError;
 use mrol_map::scan::{PointFilter, SkippedPoints};
 use mrol_map::util::StopSignal;
 
@@ -198,7 +197,12 @@ impl HostedMap {
         let points: Vec<Point> =
             all.iter().copied().filter(|point| PointFilter::default().keeps(*point)).collect();
         if points.is_empty() {
-            return Err(MappingError::NoReturns { points: all.len(), zeros: skipped.zeros }.into());
+            // No settings of a robot say otherwise here.
+            let (count, zeros) = (all.len(), skipped.zeros);
+            let message = format!(
+                "none of the scan's {count} points is a return: {zeros} are at 0 0 0, the others are not finite"
+            );
+            return Err(ServiceError::new(Reason::NoReturns, message));
         }
         let search = search_settings(settings.limits.localization_grid_bytes_max);
         let mut lent: Vec<Reservation> = Vec::new();
