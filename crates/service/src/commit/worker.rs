@@ -184,16 +184,20 @@ impl Worker {
             }
             return;
         }
-        for Pending { change, answer, .. } in group.drain(..) {
+        let last = group.len() - 1;
+        for (k, Pending { change, answer, .. }) in group.drain(..).enumerate() {
             let Published { announced, recent } = &self.published;
             let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
             debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
             announced.send_replace(committed.revision);
+            // Counted before the last one hears of it, so that whoever was answered finds its commit in the metrics.
+            if k == last {
+                self.durations.record(begin.elapsed());
+            }
             drop(answer.send(Ok(committed)));
             recent.push(WatchedChange::of(committed.revision, Some(committed.hash), change, levels));
         }
         self.tell_durable();
-        self.durations.record(begin.elapsed());
         self.thin_in_memory();
     }
 
