@@ -89,6 +89,15 @@ impl RayAgreement {
         self.of_scan.share().max(self.of_map.share())
     }
 
+    /// How many times as much is contradicted at another pose, of the side of which that is more: people contradict one side wherever
+    /// the scan is put. One point more or less is chance.
+    pub(super) fn contrast(&self, there: &Self) -> f64 {
+        let of = |here: RayCounts, there: RayCounts| {
+            (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64
+        };
+        of(self.of_scan, there.of_scan).max(of(self.of_map, there.of_map))
+    }
+
     /// The smaller evidence of both sides.
     pub fn evidence(&self) -> f64 {
         self.of_scan.evidence().min(self.of_map.evidence())

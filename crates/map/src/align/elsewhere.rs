@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 use std::f64::consts::TAU;
 
-use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::agreement::spread;
 use super::ascent::{Ascent, Steps};
@@ -52,33 +52,36 @@ pub(super) fn turned(
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_TURNS, settings);
-    let guesses = (1..YAWS).map(|yaw| {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (TAU * f64::from(yaw) / f64::from(YAWS)));
-        Pose::from_parts(pose.translation, turn * pose.rotation)
-    });
-    few.as_good(pose, guesses.collect(), map.settings().levels - 1)
+    few.as_good(pose, other_yaws(pose).collect(), map.settings().levels - 1)
 }
 
-/// Where a scan that was found at `pose` may fit as well, shifted on the floor along `axes`, and those across them, by up to `possible_m`.
+/// A pose (map_from_sensor), turned about the map's z axis by each of the yaws that are tried.
+pub(super) fn other_yaws(pose: &Pose) -> impl Iterator<Item = Pose> {
+    (1..YAWS).map(|yaw| {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (TAU * f64::from(yaw) / f64::from(YAWS)));
+        Pose::from_parts(pose.translation, turn * pose.rotation)
+    })
+}
+
+/// Where a scan that was found at `pose` may fit as well, shifted along `axes` (of length 1, map frame) by up to `possible_m`, either way.
 pub(super) fn shifted(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
     pose: &Pose,
-    axes: &[Vector2<f64>],
-    possible_m: impl Fn(Vector2<f64>) -> f64,
+    axes: &[Vector3<f64>],
+    possible_m: impl Fn(Vector3<f64>) -> f64,
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_SHIFTS, settings);
     let step_m = map.lattice().resolution_m(few.level);
-    let across = |axis: &Vector2<f64>| Vector2::new(-axis.y, axis.x);
     let overlap = few.overlap(few.level);
     let least = AS_GOOD_ASIDE * overlap.at(&[*pose], few.stop)[0] as f64;
     let mut peaks: Vec<Pose> = Vec::new();
-    for axis in axes.iter().flat_map(|axis| [*axis, across(axis)]) {
+    for &axis in axes {
         let steps = (possible_m(axis) / step_m).floor().clamp(0.0, STEPS_MAX) as i32;
         let at = |step: i32| {
             let way = axis * (f64::from(step) * step_m);
-            Pose::from_parts(Translation3::new(way.x, way.y, 0.0) * pose.translation, pose.rotation)
+            Pose::from_parts(Translation3::from(way) * pose.translation, pose.rotation)
         };
         let poses: Vec<Pose> = (-steps..=steps).map(at).collect();
         let heights = overlap.at(&poses, few.stop);

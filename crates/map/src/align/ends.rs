@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::agreement::{RayAgreement, Rays, Rival};
+use super::elsewhere::other_yaws;
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
@@ -28,6 +29,8 @@ const AGREEMENT_MIN: f64 = 0.9;
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
+/// How many times as much rays have to contradict a pose that is told from an end.
+const CONTRAST_MIN: f64 = 2.0;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
 
@@ -151,21 +154,20 @@ impl<'a> Ends<'a> {
             return Some((Verdict::LowOverlap, reason));
         }
         let from_guess = self.prior.map(|prior| pose_difference(&prior.guess, &found.map_from_sensor).0);
-        if let Some(far_m) = from_guess.filter(|meters| *meters > REACH_M) {
-            let reason =
-                format!("it is {far_m:.2} m from the guess, others were looked for up to {REACH_M} m");
-            return Some((Verdict::Ambiguous, reason));
-        }
         let tilt_deg = self.prior.map_or(0.0, |prior| tilt_deg(&prior.guess, &found.map_from_sensor));
         let is_near = from_guess.is_some_and(|meters| meters <= NEAR_M) && tilt_deg <= NEAR_TILT_DEG;
         let share = if is_near { agreement.better() } else { agreement.worse() };
-        (share < AGREEMENT_MIN).then(|| {
+        if share < AGREEMENT_MIN {
             let (a, b) = (of_scan.contradicted_share(), of_map.contradicted_share());
             let words = "of the scan's points and of what earlier scans met are contradicted";
             let sides = if is_near { "of both" } else { "of one, so far from the guess," };
             let most = 1.0 - AGREEMENT_MIN;
-            (Verdict::Contradicted, format!("{a:.3} and {b:.3} {words}: at most {most:.1} {sides} may be"))
-        })
+            let reason = format!("{a:.3} and {b:.3} {words}: at most {most:.1} {sides} may be");
+            return Some((Verdict::Contradicted, reason));
+        }
+        let far_m = from_guess.filter(|meters| *meters > REACH_M)?;
+        let reason = format!("it is {far_m:.2} m from the guess, others were looked for up to {REACH_M} m");
+        Some((Verdict::Ambiguous, reason))
     }
 
     /// The end that rays contradict least, of those that may be believed.
@@ -184,10 +186,9 @@ impl<'a> Ends<'a> {
     }
 
     /// The rivals of `best`, other poses that may be the true one: ends elsewhere whose cost is little more; ends that rays clearly prefer,
-    /// since what is known beforehand may be too sure of itself; and the guess itself, where the scan would show new ground.
+    /// since what is known beforehand may be too sure of itself; and [the guess](Self::rivals_at_guess).
     ///
-    /// An end with an open direction is not believed, but it is possible. A pose elsewhere at which the scan would show new ground only is
-    /// no rival: there are always some.
+    /// An end with an open direction is not believed, but it is possible.
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
         let own = best.cost(preferred);
@@ -200,19 +201,48 @@ impl<'a> Ends<'a> {
         let ends = ends.filter(|end| is_elsewhere(&end.alignment.map_from_sensor)).filter(is_as_likely);
         let of_end =
             |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
-        let guess = self.prior.map(|prior| prior.guess).filter(is_elsewhere).and_then(|map_from_sensor| {
-            let look = Look::of(self.rays, &map_from_sensor, &self.witnesses, self.stop);
-            let agreement = look.agreement();
-            let is_new_ground = !has_evidence(&agreement) && is_hardly_contradicted(&agreement);
-            let is_as_likely = cost(0.0, &look, &preferred.look) - own <= RIVAL;
-            (is_new_ground && is_as_likely).then_some(Rival { map_from_sensor, agreement })
-        });
-        ends.map(of_end).chain(guess).collect()
+        ends.map(of_end).chain(self.rivals_at_guess(best, preferred)).collect()
     }
 
-    /// How rays agree at some other pose.
-    pub(super) fn agreement_at(&self, pose: &Pose) -> RayAgreement {
-        Look::of(self.rays, pose, &self.witnesses, self.stop).agreement()
+    /// The guess, where the scan would show new ground there, or where `best` is farther from it than guesses are off; and where the robot
+    /// may have been turned unseen, what the guess looks like turned, if the scan would show new ground and rays clearly prefer that.
+    ///
+    /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
+    fn rivals_at_guess(&self, best: &End, preferred: &End) -> Vec<Rival> {
+        let Some(prior) = self.prior else { return Vec::new() };
+        let (own, resolution_m) = (best.cost(preferred), self.resolution_m);
+        let look_at = |pose: Pose| {
+            let is_elsewhere = !is_same_place(&pose, &best.alignment.map_from_sensor, resolution_m);
+            is_elsewhere.then(|| (pose, Look::of(self.rays, &pose, &self.witnesses, self.stop)))
+        };
+        let rival = |(map_from_sensor, look): &(Pose, Look)| Rival {
+            map_from_sensor: *map_from_sensor,
+            agreement: look.agreement(),
+        };
+        let is_far = best.deviations * best.deviations > RIVAL;
+        let guess = look_at(prior.guess).filter(|(_, look)| {
+            let agreement = look.agreement();
+            let is_possible = is_hardly_contradicted(&agreement) && (is_far || !has_evidence(&agreement));
+            is_possible && cost(0.0, look, &preferred.look) - own <= RIVAL
+        });
+        // Of fewer contradictions none is clear.
+        let RayAgreement { of_scan, of_map } = best.agreement;
+        let may_have_turned =
+            prior.leaves_yaw_open() && (of_scan.contradicted + of_map.contradicted) as f64 >= RIVAL;
+        let turned = may_have_turned.then(|| other_yaws(&prior.guess)).into_iter().flatten();
+        let turned = turned.filter_map(look_at).filter(|(_, look)| {
+            let agreement = look.agreement();
+            let is_new_ground = is_hardly_contradicted(&agreement) && !has_evidence(&agreement);
+            is_new_ground && best.look.contradicted_more_than(look) >= RIVAL.sqrt()
+        });
+        guess.into_iter().chain(turned).map(|found| rival(&found)).collect()
+    }
+
+    /// True of a pose that rays contradict clearly more than an end: several times as much, and not by chance.
+    pub(super) fn is_clearly_worse(&self, pose: &Pose, end: &End) -> bool {
+        let look = Look::of(self.rays, pose, &self.witnesses, self.stop);
+        end.agreement.contrast(&look.agreement()) >= CONTRAST_MIN
+            && look.contradicted_more_than_by_chance(&end.look) >= RIVAL.sqrt()
     }
 
     /// The share of what each witness met that another one contradicts.

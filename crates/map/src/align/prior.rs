@@ -1,6 +1,6 @@
 //! The prior of an alignment: what is known of a scan's pose before it is looked at.
 
-use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector2, Vector6};
+use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
 
 use super::gravity::Gravity;
 use super::settings::AlignmentSettings;
@@ -172,10 +172,10 @@ impl PosePrior {
         3.0 * variance.sqrt() >= YAW_OPEN_DEG.to_radians() && (is_told || self.may_have_turned)
     }
 
-    /// Three standard deviations along a direction on the floor (of length 1), meters.
-    pub(super) fn possible_m(&self, axis: Vector2<f64>) -> f64 {
+    /// Three standard deviations along a direction (of length 1, map frame), meters.
+    pub(super) fn possible_m(&self, axis: Vector3<f64>) -> f64 {
         let covariance = self.spread();
-        let along = Vector6::new(axis.x, axis.y, 0.0, 0.0, 0.0, 0.0);
+        let along = Vector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0);
         3.0 * along.dot(&(covariance.0 * along)).max(0.0).sqrt()
     }
 

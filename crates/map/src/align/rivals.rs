@@ -6,7 +6,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
-use super::agreement::{RayAgreement, RayCounts, Rays};
+use super::agreement::{RayAgreement, Rays};
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
 use super::ends::{End, Ends, RIVAL};
 use super::prior::PosePrior;
@@ -21,8 +21,7 @@ use crate::map::MultiResolutionMap;
 /// each other.
 const CONTRADICTED_MIN: f64 = 0.005;
 const UNUSUAL: f64 = 2.0;
-/// How many times as much rays have to contradict a pose aside: so many r_0, or turned by so many degrees.
-const CONTRAST_MIN: f64 = 2.0;
+/// Rays have to tell a pose from those aside: so many r_0, or turned by so many degrees.
 const ASIDE_VOXELS: f64 = 8.0;
 const ASIDE_DEG: f64 = 10.0;
 /// Other places are looked for where what is known beforehand reaches farther than this, r_0.
@@ -48,7 +47,7 @@ impl Contest<'_> {
         }
         // Whoever was turned away unseen may stand at any yaw, and where things repeat the scan fits at each of them.
         let may_have_turned = is_doubted || prior.leaves_yaw_open();
-        let others = self.others(&best.alignment, prior, may_have_turned);
+        let others = self.others(&best.alignment, prior, is_doubted, may_have_turned);
         if others.is_empty() || self.settings.multi_start.ascents == 0 {
             return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&ends) };
         }
@@ -72,16 +71,25 @@ impl Contest<'_> {
     }
 
     /// Where else the scan may fit as well, with the coarsest level to ascend on from there: shifted as far as the prior reaches around
-    /// its guess, along the map's axes and those of what holds the pose, and turned.
-    fn others(&self, found: &Alignment, prior: &PosePrior, may_have_turned: bool) -> Vec<(Pose, u32)> {
+    /// its guess, along the map's axes and those of what holds the pose, and turned. Where the pose is doubted, on other floors too: the
+    /// robot may have taken a lift.
+    fn others(
+        &self,
+        found: &Alignment,
+        prior: &PosePrior,
+        is_doubted: bool,
+        may_have_turned: bool,
+    ) -> Vec<(Pose, u32)> {
         let far_m = REACH_VOXELS * self.map.lattice().resolution_m(0);
         let from_guess = found.map_from_sensor.translation.vector - prior.guess.translation.vector;
-        let possible_m = |axis: Vector2<f64>| {
-            let possible_m = prior.possible_m(axis) + from_guess.xy().dot(&axis).abs();
+        let possible_m = |axis: Vector3<f64>| {
+            let possible_m = prior.possible_m(axis) + from_guess.dot(&axis).abs();
             if possible_m > far_m { possible_m } else { 0.0 }
         };
-        let axes = [Some(Vector2::x()), least_held(found)];
-        let axes: Vec<_> = axes.into_iter().flatten().collect();
+        let on_floor = [Some(Vector2::x()), least_held(found)].into_iter().flatten();
+        let on_floor = on_floor.flat_map(|axis| [axis, Vector2::new(-axis.y, axis.x)]);
+        let axes = on_floor.map(|axis| axis.push(0.0)).chain(is_doubted.then_some(Vector3::z()));
+        let axes: Vec<Vector3<f64>> = axes.collect();
         let pose = &found.map_from_sensor;
         let shifted = shifted(self.map, self.scan, pose, &axes, possible_m, self.settings);
         let turned = match may_have_turned {
@@ -157,7 +165,7 @@ impl Contest<'_> {
             let aside = Pose::from_parts(shift * pose.translation, turn * pose.rotation);
             // Most are ruled out by what is known beforehand, without a look.
             let farther = ends.deviations(&aside).powi(2) - end.deviations.powi(2);
-            farther <= RIVAL && contrast(&end.agreement, &ends.agreement_at(&aside)) < CONTRAST_MIN
+            farther <= RIVAL && !ends.is_clearly_worse(&aside, end)
         };
         let (shift, degrees) = shifts.into_iter().chain(turns).find(is_open)?;
         Some(match degrees == 0.0 {
@@ -172,14 +180,6 @@ fn least_held(found: &Alignment) -> Option<Vector2<f64>> {
     let directions = found.information.directions().into_iter();
     let on_floor = directions.map(|open| Vector2::new(open.direction[0], open.direction[1]));
     on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())
-}
-
-/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one side wherever the
-/// scan is put. One point more or less is chance.
-fn contrast(here: &RayAgreement, there: &RayAgreement) -> f64 {
-    let of =
-        |here: RayCounts, there: RayCounts| (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64;
-    of(here.of_scan, there.of_scan).max(of(here.of_map, there.of_map))
 }
 
 /// Says how rays agree at a pose.
