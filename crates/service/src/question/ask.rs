@@ -62,7 +62,7 @@ impl MapService {
                 let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
                 limit.run(stop, |stop| map.answer_question(&map.questioned(limits), &question, limits, stop))
             };
-            self.inner.pools.planning.run_for(&self.asker, answer).await?
+            self.inner.lanes.planning.run(&self.asker, answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
@@ -75,7 +75,7 @@ impl MapService {
         }
         let inner = Arc::clone(&self.inner);
         let check = move |_: StopSignal<'_>| question.check(&inner.settings.limits).map(|()| question);
-        self.inner.pools.planning.run_for(&self.asker, check).await?
+        self.inner.lanes.planning.run(&self.asker, check).await?
     }
 }
 
@@ -89,7 +89,7 @@ impl Inner {
     ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
         let limits = &self.settings.limits;
         let is_small = question.work_ns() <= INLINE_NS && bytes_of(question, limits) <= INLINE_BYTES;
-        if !is_small || self.pools.planning.is_wanted() {
+        if !is_small || self.lanes.planning.is_wanted() {
             return None;
         }
         let stop = StopSignal::NEVER.by(Instant::now() + INLINE_TIME_MAX);
@@ -182,7 +182,7 @@ mod tests {
             map.committer().exchange(&VoxelSet::default(), &VoxelKey::new(index).into_iter().collect());
         };
         let handed_over =
-            || service.pools().iter().find(|pool| pool.name == "planning").map_or(0, |pool| pool.begun);
+            || service.lanes().iter().find(|lane| lane.name == "planning").map_or(0, |lane| lane.begun);
         let ask = async || service.ask(&name, pose_check()).await.unwrap().answer.words();
         for (index, expected) in [([3, 0, 0], 0), ([1, 0, 0], 1)] {
             put(index);
