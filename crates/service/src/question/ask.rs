@@ -56,7 +56,11 @@ impl MapService {
                 return answer;
             }
             let inner = Arc::clone(&self.inner);
-            let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
+            let limits = self.limits();
+            let limit = match question.is_in_parts() {
+                true => TimeLimit::new("long_question_time_max", limits.long_question_time_max_s),
+                false => TimeLimit::new("question_time_max", limits.question_time_max_s),
+            };
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
                 let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;

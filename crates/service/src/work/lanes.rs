@@ -95,7 +95,7 @@ impl Lanes {
             watch: of("watch", ONE_AT_A_TIME, 0, watches, 0)?,
             observers: of("observers", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
             blocks: of("blocks", of_queries, NICENESS, waiting, 0)?,
-            planning: of("planning", query_threads, 0, waiting, 0)?.behind(&robots, beside_robots),
+            planning: of("planning", query_threads, 0, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
         })
     }
 
