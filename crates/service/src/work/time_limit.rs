@@ -32,9 +32,8 @@ impl TimeLimit {
         let (ends, paused_for) = (self.ends(), stop.paused_for());
         let done = job(stop.by(ends));
         let paused_for = stop.paused_for().saturating_sub(paused_for);
-        if let Some(ends) = &mut *self.ends.lock() {
-            *ends += paused_for;
-        }
+        let moved = self.ends() + paused_for;
+        *self.ends.lock() = Some(moved);
         done.map_err(|error| self.named(error))
     }
 
