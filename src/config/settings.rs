@@ -97,6 +97,7 @@ impl Config {
         }
         for (key, threads) in [
             ("threads.query", self.threads.query),
+            ("threads.planning_beside_robots", self.threads.planning_beside_robots),
             ("threads.mapping", self.threads.mapping),
             ("threads.alignment", self.threads.alignment),
             ("threads.localization", self.threads.localization),
@@ -139,6 +140,7 @@ impl Config {
             gauges: None,
             observers: Vec::new(),
             query_threads: self.threads.query,
+            planning_threads_beside_robots: self.threads.planning_beside_robots,
             mapping_threads: self.threads.mapping,
             alignment_threads: self.threads.alignment,
             localization_threads: self.threads.localization,

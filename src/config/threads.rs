@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThreadsConfig {
-    /// Threads for queries, listings and descriptions.
+    /// Threads for queries, listings and descriptions; and as many for planners' questions.
     pub query: usize,
+    /// Threads for planners' questions while robots insert scans, and for a second after; 0 means half of `query`.
+    pub planning_beside_robots: usize,
     /// Threads for insertions, with their alignments, and deletions.
     pub mapping: usize,
     /// Threads for alignments of scans that are not inserted, which a key of scope read may ask for. 1.
@@ -18,6 +20,6 @@ pub struct ThreadsConfig {
 
 impl Default for ThreadsConfig {
     fn default() -> Self {
-        Self { query: 0, mapping: 0, alignment: 1, localization: 1 }
+        Self { query: 0, planning_beside_robots: 0, mapping: 0, alignment: 1, localization: 1 }
     }
 }

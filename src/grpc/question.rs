@@ -59,8 +59,8 @@ where
     (MapName, Q): TryFrom<M, Error = ServiceError>,
     C: Send + 'static,
 {
-    let (bytes, service) = (message.encoded_len(), service.clone());
-    off_runtime(bytes, counted, move || question_of(message, service.limits())).await?
+    let (bytes, of_limits) = (message.encoded_len(), service.clone());
+    off_runtime(service, bytes, counted, move || question_of(message, of_limits.limits())).await?
 }
 
 /// Makes messages of streams of requests that may leave out their map.

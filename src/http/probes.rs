@@ -1,4 +1,4 @@
-//! What orchestrators and Prometheus ask: answered whatever the pools are doing.
+//! What orchestrators and Prometheus ask: answered whatever the lanes are doing.
 
 use axum::Json;
 use axum::extract::{Request, State};
@@ -133,5 +133,5 @@ async fn scrape(metrics: &Metrics, service: &MapService) -> String {
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    metrics.render(&service.pools(), &service.map_names(), &maps, &service.unavailable_maps())
+    metrics.render(&service.lanes(), &service.map_names(), &maps, &service.unavailable_maps())
 }

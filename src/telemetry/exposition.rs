@@ -8,7 +8,7 @@ use super::map_counters;
 use super::map_counters::Series;
 use mrol_map::map::{FilterInfo, LevelInfo, MapName};
 use mrol_map::util::Durations;
-use mrol_service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
+use mrol_service::{LaneUse, MapInfo, MapStorage, UnavailableMap};
 
 /// Appends what was counted by map.
 pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Series, u64>)]) {
@@ -25,32 +25,32 @@ pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Serie
     }
 }
 
-/// Appends what is known of `pools`.
-pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
-    type Value = fn(&PoolUse) -> u64;
+/// Appends what is known of `lanes`.
+pub(super) fn write_lanes(text: &mut String, lanes: &[LaneUse]) {
+    type Value = fn(&LaneUse) -> u64;
     let families: [(&'static str, Kind, &str, Value); 4] = [
-        ("mrol_jobs_waiting", Kind::Gauge, "Jobs that wait for a thread, by pool", |pool| {
-            pool.waiting as u64
+        ("mrol_jobs_waiting", Kind::Gauge, "Jobs that wait for a thread, by pool", |lane| {
+            lane.waiting as u64
         }),
-        ("mrol_jobs_running", Kind::Gauge, "Jobs in hand, by pool", |pool| pool.running as u64),
-        ("mrol_jobs_begun_total", Kind::Counter, "Jobs that were taken in hand, by pool", |pool| pool.begun),
+        ("mrol_jobs_running", Kind::Gauge, "Jobs in hand, by pool", |lane| lane.running as u64),
+        ("mrol_jobs_begun_total", Kind::Counter, "Jobs that were taken in hand, by pool", |lane| lane.begun),
         (
             "mrol_jobs_cancelled_total",
             Kind::Counter,
             "Jobs whose callers went before the answer, by pool",
-            |pool| pool.cancelled,
+            |lane| lane.cancelled,
         ),
     ];
     for (name, kind, what, value) in families {
         let mut family = Family::begin(text, name, kind, what);
-        for pool in pools {
-            family.sample(&[("pool", &pool.name)], value(pool));
+        for lane in lanes {
+            family.sample(&[("pool", &lane.name)], value(lane));
         }
     }
     let what = "Seconds that jobs waited for a thread, by pool";
     let mut family = Family::begin(text, "mrol_job_wait_seconds", Kind::Histogram, what);
-    for pool in pools {
-        family.histogram(("pool", &pool.name), &pool.waits);
+    for lane in lanes {
+        family.histogram(("pool", &lane.name), &lane.waits);
     }
 }
 

@@ -61,4 +61,4 @@ pub use scan::{
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use watch::Watch;
-pub use work::{Asker, PoolUse};
+pub use work::{Asker, LaneUse};

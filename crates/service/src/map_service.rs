@@ -11,7 +11,7 @@ use super::maps::{Catalog, HostedMap};
 use super::observer::{Change, End, Ended, Outcome};
 use super::resources::{Readings, ResourceBudget, Shortage};
 use super::settings::ServiceSettings;
-use super::work::{Asker, FreeThread, Pool, PoolUse, Pools};
+use super::work::{Asker, FreeThread, Lane, LaneUse, Lanes, Requester};
 use mrol_map::map::{CallerName, Committed, MapName};
 use mrol_map::util::StopSignal;
 use mrol_store::OpeningProgress;
@@ -36,7 +36,7 @@ pub struct MapService {
 pub(super) struct Inner {
     pub(super) settings: ServiceSettings,
     pub(super) catalog: Catalog,
-    pub(super) pools: Pools,
+    pub(super) lanes: Lanes,
     pub(super) budget: Arc<ResourceBudget>,
 }
 
@@ -51,7 +51,7 @@ impl MapService {
         settings.filter.checked()?;
         let inner = Inner {
             catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
-            pools: Pools::start(&settings)?,
+            lanes: Lanes::start(&settings)?,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
         };
@@ -76,7 +76,7 @@ impl MapService {
         Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller, asker }
     }
 
-    /// The same, where work counts for `asker`: callers take turns at the threads for questions.
+    /// The same, where work counts for `asker`: callers take turns at the threads for all that uses the CPU.
     #[must_use]
     pub fn asked_by(self, asker: Asker) -> Self {
         Self { asker, ..self }
@@ -104,8 +104,20 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 12] {
-        self.inner.pools.in_use()
+    pub fn lanes(&self) -> [LaneUse; 14] {
+        self.inner.lanes.in_use()
+    }
+
+    /// Reads a large request, or writes a large answer or a part of one, away from the threads of the async runtime: in
+    /// the caller's turn.
+    ///
+    /// # Errors
+    /// `Internal` when `make` panicked.
+    pub async fn convert<T: Send + 'static>(
+        &self,
+        make: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        self.inner.lanes.messages.run(&self.asker, move |_| make()).await
     }
 
     /// Does `work`, and tells the observers how the operation ended, with what `outcome` makes of the answer. They are
@@ -132,22 +144,22 @@ impl MapService {
         self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
     }
 
-    /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares
+    /// Prepares a change on a thread of `lane` in the requester's turn, or on `first` where there is one, and waits until it is made. Prepares
     /// it again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it;
     /// of one who goes away later the observers are told what the operation removed from the map all the same.
     pub(super) async fn submit_and_wait<A: Send + 'static>(
         &self,
         (operation, map): (&'static str, &Arc<HostedMap>),
-        pool: &Pool,
+        (lane, requester): (&Lane, &Requester),
         mut first: Option<FreeThread>,
         submit: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
             let thread = match first.take() {
                 Some(thread) => thread,
-                None => pool.thread().await?,
+                None => lane.thread(requester).await?,
             };
-            match pool.run_on(thread, submit.clone()).await?? {
+            match lane.run_on(thread, submit.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
                 Step::Submitted(outcome, answer) => match self.outcome_of(operation, map, outcome).await? {
                     Ok(committed) => return Ok(answer(committed)),

@@ -30,6 +30,9 @@ pub struct ServiceSettings {
     pub observers: Vec<Arc<dyn Observer>>,
     /// Threads for queries; 0 = one a core.
     pub query_threads: usize,
+    /// Threads for planners' questions while robots insert scans, and for a second after; 0 = half of those for
+    /// queries. Otherwise as many as for queries.
+    pub planning_threads_beside_robots: usize,
     /// Threads for insertions and deletions; 0 = one a core.
     pub mapping_threads: usize,
     /// Threads for alignments of scans that are not inserted; 0 = one a core.

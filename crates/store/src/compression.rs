@@ -24,6 +24,7 @@ pub(super) fn compress_onto(bytes: Vec<u8>, body: &[u8], stop: StopSignal<'_>) -
     }
     frame.set_pledged_src_size(Some(body.len() as u64))?;
     for piece in stop.pieces(body, BYTES_PER_STOP_CHECK) {
+        stop.give_way();
         frame.write_all(piece)?;
     }
     if stop.is_stopped() {
@@ -41,6 +42,7 @@ pub(super) fn decompress(frame: &[u8], length: usize, stop: StopSignal<'_>) -> i
     let mut unread = zstd::Decoder::with_buffer(frame)?;
     unread.window_log_max(WINDOW_LOG_MAX)?;
     while !stop.is_stopped() {
+        stop.give_way();
         let piece = BYTES_PER_STOP_CHECK.min(length - body.len());
         // One byte more than allowed, to detect a frame that holds more.
         let read = unread.by_ref().take(piece.max(1) as u64).read_to_end(&mut body)?;

@@ -7,12 +7,13 @@ use serde::de::DeserializeOwned;
 
 use super::object::Object;
 use super::{params, unreadable};
+use crate::access::Authorized;
 use crate::admission::{InboundBody, off_runtime};
 use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
 use mrol_client::wire::InField;
 use mrol_map::util::excerpt;
-use mrol_service::{PointCloud, Reason, ServiceError};
+use mrol_service::{MapService, PointCloud, Reason, ServiceError};
 
 const JSON: &str = "application/json";
 const OCTET_STREAM: &str = "application/octet-stream";
@@ -118,19 +119,21 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
 ) -> Result<(T, usize), HttpError> {
     no_query(&request, JSON)?;
     let arrival = InboundBody::of(request.extensions())?.clone();
+    let service = Authorized::of(request.extensions())?.service.clone();
     let body = read(request, adapter).await?;
     let bytes = body.len();
-    Ok((parse_beside(body, 0, arrival).await?, bytes))
+    Ok((parse_beside(&service, body, 0, arrival).await?, bytes))
 }
 
 /// Parses JSON that is in memory beside other bytes of its request; it counts with what is made of it.
 pub(in crate::http) async fn parse_beside<T: DeserializeOwned + Send + 'static>(
+    service: &MapService,
     json: Bytes,
     others: usize,
     arrival: InboundBody,
 ) -> Result<T, HttpError> {
     arrival.at_least(json.len() * JSON_AND_PARSED + others)?;
-    off_runtime(json.len(), arrival, move || parse(&json)).await?
+    off_runtime(service, json.len(), arrival, move || parse(&json)).await?
 }
 
 fn no_query(request: &Request, content_type: &str) -> Result<(), HttpError> {

@@ -23,7 +23,7 @@ use mrol_client::wire::required;
 use mrol_map::map::DistanceBlock;
 use mrol_map::util::Keyword;
 use mrol_map::voxel::{BlockMask, VoxelKey};
-use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels, Reason, ServiceError};
+use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels, MapService, Reason, ServiceError};
 
 /// Which part of the map, in which form.
 #[derive(Deserialize, IntoParams)]
@@ -161,7 +161,7 @@ pub(crate) async fn get(
     let answer = service.get_block(&map, params.try_into()?).await?;
     match wants_bytes(&headers) {
         true => Ok(as_bytes(answer)),
-        false => as_json(answer, &adapter),
+        false => as_json(answer, &adapter, &service).await,
     }
 }
 
@@ -197,7 +197,11 @@ impl TryFrom<BlockParams> for BlockRequest {
 const BLOCKS: Pieces = Pieces { field: "blocks", items: 2_048, item_bytes: 256 };
 const DISTANCES: Pieces = Pieces { field: "distances", items: 128 << 10, item_bytes: 4 };
 
-fn as_json(answer: BlockAnswer, adapter: &Adapter) -> Result<Response, HttpError> {
+async fn as_json(
+    answer: BlockAnswer,
+    adapter: &Adapter,
+    service: &MapService,
+) -> Result<Response, HttpError> {
     let BlockAnswer { level, resolution_m, voxels, version } = answer;
     let mut head = BlockHead { level, resolution_m, version: version.into(), cells: None };
     match voxels {
@@ -205,16 +209,17 @@ fn as_json(answer: BlockAnswer, adapter: &Adapter) -> Result<Response, HttpError
             let count = blocks.len();
             let copied_bytes = count * size_of::<(VoxelKey, BlockMask)>();
             let kept = adapter.admission.keep(copied_bytes + BLOCKS.bytes(count))?;
-            let blocks: Vec<_> = blocks.blocks().collect::<Result<_, _>>()?;
+            let copy = move || blocks.blocks().collect::<Result<Vec<_>, _>>();
+            let blocks = service.convert(copy).await??;
             let write = move |text: &mut String, item: usize| write_block(text, &blocks[item]);
-            Ok(pieces::response(BLOCKS.of(&head, count, write)?, kept))
+            Ok(pieces::response(service, BLOCKS.of(&head, count, write)?, kept))
         }
         BlockVoxels::Dense(DistanceBlock { origin, size, cap, distances }) => {
             head.cells = Some(BlockCells { origin, size, cap: cap.get() });
             let count = distances.len();
             let kept = adapter.admission.keep(count + DISTANCES.bytes(count))?;
             let write = move |text: &mut String, item: usize| text.push_str(&distances[item].to_string());
-            Ok(pieces::response(DISTANCES.of(&head, count, write)?, kept))
+            Ok(pieces::response(service, DISTANCES.of(&head, count, write)?, kept))
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `/v1/maps/{map}/keep-outs`: list, put and remove keep-outs.
 
-use axum::response::Json;
+use axum::response::{Json, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
@@ -10,6 +10,7 @@ use crate::http::forms::body;
 use crate::http::forms::{BoxBody, OrientedBoxBody, PrismBody, SphereBody};
 use crate::http::forms::{KeepOutOfMap, Map, NoParams, Params, request_id_of};
 use crate::http::middleware::Service;
+use crate::http::pieces;
 use crate::json::described;
 use crate::json::{JsonKeepOut, JsonVersion};
 use mrol_map::map::{KeepOutName, KeepOutShape, Region};
@@ -67,6 +68,9 @@ pub(crate) struct KeepOutsResponse {
     version: JsonVersion,
 }
 
+/// About as many bytes as a keep-out takes as JSON.
+const BYTES_PER_KEEP_OUT: usize = 512;
+
 /// Lists the keep-outs of a map.
 #[utoipa::path(
     get,
@@ -77,9 +81,10 @@ pub(crate) async fn list(
     Service(service): Service,
     Map(map): Map,
     NoParams: NoParams,
-) -> Result<Json<KeepOutsResponse>, HttpError> {
+) -> Result<Response, HttpError> {
     let listing = service.list_keep_outs(&map).await?;
-    Ok(Json(listing.into()))
+    let bytes = listing.keep_outs.len() * BYTES_PER_KEEP_OUT;
+    pieces::whole(&service, bytes, move || KeepOutsResponse::from(listing)).await
 }
 
 /// Puts a keep-out: a part of space where no robot may go, whatever the map holds there.

@@ -1,7 +1,7 @@
 //! `/v1/maps`: make, describe, list and delete maps.
 
 use axum::http::StatusCode;
-use axum::response::Json;
+use axum::response::{Json, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -10,6 +10,7 @@ use crate::http::forms::FilterChoice;
 use crate::http::forms::body;
 use crate::http::forms::{Map, NoParams};
 use crate::http::middleware::Service;
+use crate::http::pieces;
 use crate::json::JsonMap;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{LEVELS_DEFAULT, MapName, MapOrigin, MapSettings};
@@ -117,19 +118,23 @@ pub(crate) async fn describe(
     Ok(Json(info.into()))
 }
 
+/// About as many bytes as a map takes as JSON.
+const BYTES_PER_MAP: usize = 2048;
+
 /// Lists the maps that the caller may name.
 #[utoipa::path(
     get,
     path = "/v1/maps",
     responses((status = 200, description = "Answered", body = MapsResponse))
 )]
-pub(crate) async fn list(
-    Service(service): Service,
-    NoParams: NoParams,
-) -> Result<Json<MapsResponse>, HttpError> {
-    let maps = service.list_maps().await?.into_iter().map(Into::into).collect();
-    let unavailable = service.unavailable_maps().into_iter().map(Into::into).collect();
-    Ok(Json(MapsResponse { maps, unavailable }))
+pub(crate) async fn list(Service(service): Service, NoParams: NoParams) -> Result<Response, HttpError> {
+    let (maps, unavailable) = (service.list_maps().await?, service.unavailable_maps());
+    let bytes = (maps.len() + unavailable.len()) * BYTES_PER_MAP;
+    let listing = move || MapsResponse {
+        maps: maps.into_iter().map(Into::into).collect(),
+        unavailable: unavailable.into_iter().map(Into::into).collect(),
+    };
+    pieces::whole(&service, bytes, listing).await
 }
 
 /// Deletes a map, its memory and its files.

@@ -1,7 +1,7 @@
 //! `POST /v1/maps/{map}/occupancy`: are these points in occupied voxels?
 
 use axum::http::{HeaderName, HeaderValue, header};
-use axum::response::{IntoResponse, Json, Response};
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
@@ -13,6 +13,7 @@ use crate::http::forms::{Map, Numbers7, params};
 use crate::http::forms::{Points, points_of};
 use crate::http::headers;
 use crate::http::middleware::Service;
+use crate::http::pieces;
 use crate::json::described;
 use crate::json::{ByKeyword, JsonPose, JsonVersion};
 use mrol_client::wire::{InField, uuid_from};
@@ -109,12 +110,15 @@ pub(crate) async fn query(
     Map(map): Map,
     body: Points<QueryBody, QueryParams>,
 ) -> Result<Response, HttpError> {
-    let (query, answer_with): (_, fn(PointAnswer) -> Response) = match body {
-        Points::Json(query) => (query.try_into()?, as_json),
-        Points::Bytes(body, rest) => (rest.with(points_of(body)?)?, as_bitmap),
+    let (query, is_json) = match body {
+        Points::Json(query) => (query.try_into()?, true),
+        Points::Bytes(body, rest) => (rest.with(points_of(body)?)?, false),
     };
     let answer = service.query_points(&map, query).await?;
-    Ok(answer_with(answer))
+    match is_json {
+        true => pieces::whole(&service, answer.points * BYTES_PER_POINT, || as_json(answer)).await,
+        false => Ok(as_bitmap(answer)),
+    }
 }
 
 impl TryFrom<QueryBody> for PointQuery {
@@ -148,14 +152,16 @@ impl QueryParams {
     }
 }
 
-fn as_json(answer: PointAnswer) -> Response {
+/// Bytes of a point in an answer of JSON: `false` and a comma.
+const BYTES_PER_POINT: usize = 6;
+
+fn as_json(answer: PointAnswer) -> QueryResponse {
     let bit = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
-    Json(QueryResponse {
+    QueryResponse {
         occupied: (0..answer.points).map(bit).collect(),
         points_occupied: answer.points_occupied,
         version: answer.version.into(),
-    })
-    .into_response()
+    }
 }
 
 fn as_bitmap(answer: PointAnswer) -> Response {

@@ -1,7 +1,6 @@
 //! `GET /v1/maps/{map}/trajectory?robot=&since_revision=&limit=`: the poses of the accepted scans, of all robots or of
 //! one. With a `limit`, a page of them, which says where the next one begins; without, all.
 
-use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::header;
@@ -17,10 +16,11 @@ use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
 use crate::http::forms::{Map, Params};
 use crate::http::middleware::Service;
+use crate::http::pieces;
 use crate::json::described;
 use crate::json::{JsonPose, JsonVersion};
 use mrol_map::map::{MappedScan, RobotName};
-use mrol_service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
+use mrol_service::{MapService, Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 /// Which poses.
 #[derive(Deserialize, IntoParams)]
@@ -102,15 +102,16 @@ pub(crate) async fn get(
         let TrajectoryAnswer { poses, next_since_revision, version } =
             service.trajectory(&map, query).await?;
         let end = TrajectoryEnd { version: version.into(), next_since_revision };
-        let poses = poses.iter().map(PoseResponse::from).collect();
-        return Ok(Json(TrajectoryPage { poses, end }).into_response());
+        let bytes = poses.len() * BYTES_PER_POSE;
+        let page = move || TrajectoryPage { poses: poses.iter().map(PoseResponse::from).collect(), end };
+        return pieces::whole(&service, bytes, page).await;
     }
-    let mut pieces = service.trajectory_pieces(&map, query).await?;
-    let kept = adapter.admission.keep(pieces.memory_bytes())?;
+    let mut found = service.trajectory_pieces(&map, query).await?;
+    let kept = adapter.admission.keep(found.memory_bytes())?;
     // What fails at once is answered as such.
-    let first = pieces.next().await.transpose()?;
+    let first = found.next().await.transpose()?;
     let (outbox, text) = mpsc::channel(1);
-    tokio::spawn(write(first, pieces, outbox));
+    tokio::spawn(write(service, first, found, outbox));
     let text = ReceiverStream::new(text).map(move |piece| {
         let _until_sent = &kept;
         piece.map(Bytes::from)
@@ -121,21 +122,24 @@ pub(crate) async fn get(
 /// Sends `{"poses":[...],<state>}` in pieces. What fails on
 /// the way breaks the answer off.
 async fn write(
+    service: MapService,
     first: Option<TrajectoryAnswer>,
     mut pieces: TrajectoryPieces,
     outbox: Sender<Result<String, ServiceError>>,
 ) {
     let mut text = "{\"poses\":[".to_owned();
-    let (mut piece, mut comma, mut next_since_revision) = (first.map(Ok), "", None);
+    let (mut piece, mut is_first, mut next_since_revision) = (first.map(Ok), true, None);
     while let Some(found) = piece {
-        let written = found.and_then(|found| {
-            next_since_revision = found.next_since_revision;
-            for pose in &found.poses {
-                text.push_str(std::mem::replace(&mut comma, ","));
-                text.push_str(&json(&PoseResponse::from(pose))?);
+        let written = match found {
+            Ok(found) => {
+                next_since_revision = found.next_since_revision;
+                let (mut text, comma) = (std::mem::take(&mut text), !is_first);
+                is_first &= found.poses.is_empty();
+                let append = move || append_poses(&mut text, &found.poses, comma).map(|()| text);
+                service.convert(append).await.flatten()
             }
-            Ok(std::mem::take(&mut text))
-        });
+            Err(error) => Err(error),
+        };
         let failed = written.is_err();
         if outbox.send(written).await.is_err() || failed {
             return;
@@ -146,6 +150,20 @@ async fn write(
     let end = end.map(|end| format!("],{}", end.trim_start_matches('{')));
     drop(outbox.send(end).await);
 }
+
+/// Appends poses, the first of them behind a comma where it follows others.
+fn append_poses(text: &mut String, poses: &[MappedScan], mut comma: bool) -> Result<(), ServiceError> {
+    for pose in poses {
+        if std::mem::replace(&mut comma, true) {
+            text.push(',');
+        }
+        text.push_str(&json(&PoseResponse::from(pose))?);
+    }
+    Ok(())
+}
+
+/// About as many bytes as a pose takes as JSON.
+const BYTES_PER_POSE: usize = 512;
 
 fn json(value: &impl Serialize) -> Result<String, ServiceError> {
     let not_written = |e: serde_json::Error| ServiceError::new(Reason::NotWritten, e.to_string());

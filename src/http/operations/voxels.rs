@@ -114,7 +114,7 @@ pub(crate) async fn list(
     let (keys, count) = (listing.keys, voxels_total);
     let kept = adapter.admission.keep(count * size_of::<VoxelKey>() + VOXELS.bytes(count))?;
     let write = move |text: &mut String, item: usize| write_voxel(text, keys[item]);
-    Ok(pieces::response(VOXELS.of(&head, count, write)?, kept))
+    Ok(pieces::response(&service, VOXELS.of(&head, count, write)?, kept))
 }
 
 fn write_voxel(text: &mut String, key: VoxelKey) {

@@ -12,7 +12,7 @@ use crate::http::error::HttpError;
 use crate::json::JsonVersion;
 use mrol_client::wire::pb;
 use mrol_map::voxel::VoxelKey;
-use mrol_service::{MapVersion, Reason, ServiceError};
+use mrol_service::{MapService, MapVersion, Reason, ServiceError};
 
 /// An array of an answer, as bytes.
 pub(super) enum Array {
@@ -76,12 +76,12 @@ impl Array {
 
 impl<H: Serialize + Send + 'static> Answer<H> {
     /// The answer in a form. A large one is written away from the threads that serve connections.
-    pub(super) async fn respond(self, form: Form) -> Result<Response, HttpError> {
+    pub(super) async fn respond(self, form: Form, service: &MapService) -> Result<Response, HttpError> {
         let content_type = match form {
             Form::Json => "application/json",
             Form::Arrays => "application/octet-stream",
         };
-        let body = off_runtime(self.array_bytes(), (), move || self.written(form)).await??;
+        let body = off_runtime(service, self.array_bytes(), (), move || self.written(form)).await??;
         Ok(([(header::CONTENT_TYPE, content_type)], body).into_response())
     }
 }

@@ -96,5 +96,5 @@ pub(in crate::http) async fn classify_points(
         ("free", Array::Bits(response.free, points as usize)),
     ];
     let head = ClassifiedHead { points, points_occupied, points_free };
-    Answer { head, version, arrays }.respond(form).await
+    Answer { head, version, arrays }.respond(form, &service).await
 }

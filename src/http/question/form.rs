@@ -19,6 +19,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::access::Authorized;
 use crate::admission::{InboundBody, off_runtime};
 use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
@@ -54,6 +55,7 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
         let arrival = InboundBody::of(request.extensions())?.clone();
+        let service = Authorized::of(request.extensions())?.service.clone();
         let sent = body::json_or_octets(request, adapter).await?;
         match sent {
             Sent::Json { parsed: head, bytes } => {
@@ -69,7 +71,8 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
                 let length = length.ok_or_else(|| no_head(body.len()))?;
                 let mut rest = body.split_off(LENGTH_BYTES);
                 let arrays = rest.split_off(length);
-                let head = body::parse_beside(rest, LENGTH_BYTES + arrays.len(), arrival.clone()).await?;
+                let others = LENGTH_BYTES + arrays.len();
+                let head = body::parse_beside(&service, rest, others, arrival.clone()).await?;
                 Ok(Self { head, arrays, form: Form::Arrays, bytes, arrival })
             }
         }
@@ -89,9 +92,9 @@ impl<T: Send + 'static> QuestionBody<T> {
         (MapName, Q): TryFrom<M, Error = ServiceError>,
     {
         let Self { head, arrays, bytes, arrival, .. } = self;
-        let service = service.clone();
-        let make = move || question_of(message(head, &arrays)?, service.limits());
-        Ok(off_runtime(bytes, arrival, make).await??)
+        let of_limits = service.clone();
+        let make = move || question_of(message(head, &arrays)?, of_limits.limits());
+        Ok(off_runtime(service, bytes, arrival, make).await??)
     }
 }
 

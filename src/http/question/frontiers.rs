@@ -142,7 +142,7 @@ pub(in crate::http) async fn list_frontiers(
         frontiers_total: told.frontiers_total,
         voxels_total: told.voxels_total,
     };
-    Answer { head, version, arrays: Vec::new() }.respond(form).await
+    Answer { head, version, arrays: Vec::new() }.respond(form, &service).await
 }
 
 impl From<Frontier> for FrontierJson {

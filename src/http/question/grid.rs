@@ -138,5 +138,5 @@ pub(in crate::http) async fn project_grid(
         ("tops_m", Array::Floats(response.tops_m_f32le)),
     ];
     arrays.extend(response.free.map(|free| ("free", Array::Bits(free, cells))));
-    Answer { head, version, arrays }.respond(form).await
+    Answer { head, version, arrays }.respond(form, &service).await
 }

@@ -131,5 +131,5 @@ pub(in crate::http) async fn check_motions(
     if !response.clearances_m_f32le.is_empty() {
         arrays.push(("clearances_m", Array::Floats(response.clearances_m_f32le)));
     }
-    Answer { head: MotionsHead { motions, free_count }, version, arrays }.respond(form).await
+    Answer { head: MotionsHead { motions, free_count }, version, arrays }.respond(form, &service).await
 }

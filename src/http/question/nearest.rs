@@ -115,5 +115,5 @@ pub(in crate::http) async fn find_nearest(
         ("away", Array::Vectors(response.away_f32le)),
     ];
     arrays.extend(Array::keep_outs("keep_outs", response.keep_outs));
-    Answer { head: NearestHead { points }, version, arrays }.respond(form).await
+    Answer { head: NearestHead { points }, version, arrays }.respond(form, &service).await
 }

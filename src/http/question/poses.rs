@@ -95,5 +95,5 @@ pub(in crate::http) async fn check_poses(
     let answer = check.answer;
     let answered = service.ask(&map, check).await?;
     let (head, arrays) = collisions_of(answered.answer.into(), answer);
-    Answer { head, version: answered.version, arrays }.respond(form).await
+    Answer { head, version: answered.version, arrays }.respond(form, &service).await
 }

@@ -122,5 +122,5 @@ pub(in crate::http) async fn cast_rays(
         ("voxels", voxels),
     ];
     arrays.extend(Array::keep_outs("keep_outs", response.keep_outs));
-    Answer { head: RaysHead { rays, hits }, version, arrays }.respond(form).await
+    Answer { head: RaysHead { rays, hits }, version, arrays }.respond(form, &service).await
 }

@@ -101,7 +101,7 @@ pub(in crate::http) async fn check_spheres(
     let answer = check.answer;
     let answered = service.ask(&map, check).await?;
     let (head, arrays) = collisions_of(answered.answer.into(), answer);
-    Answer { head, version: answered.version, arrays }.respond(form).await
+    Answer { head, version: answered.version, arrays }.respond(form, &service).await
 }
 
 /// Bytes of a sphere.

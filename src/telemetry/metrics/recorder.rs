@@ -21,7 +21,7 @@ use crate::telemetry::map_counters::{Family, MapCounters};
 use crate::telemetry::{exposition, families};
 use mrol_map::map::{MapName, RobotName};
 use mrol_service::{
-    End, Ended, JudgedScan, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
+    End, Ended, JudgedScan, LaneUse, MapInfo, Observer, Outcome, Readings, Reason, Shortage, UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -221,18 +221,18 @@ impl Metrics {
         self.0.maps.keep(names);
     }
 
-    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `pools`, `maps` and those
+    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `lanes`, `maps` and those
     /// that are `unavailable` as they are now: a map that is gone leaves nothing behind.
     pub fn render(
         &self,
-        pools: &[PoolUse],
+        lanes: &[LaneUse],
         names: &[MapName],
         maps: &[MapInfo],
         unavailable: &[UnavailableMap],
     ) -> String {
         let mut text = self.0.recorder.handle().render();
         exposition::write_counters(&mut text, &self.0.maps.of(names));
-        exposition::write_pools(&mut text, pools);
+        exposition::write_lanes(&mut text, lanes);
         exposition::write_maps(&mut text, maps);
         exposition::write_unavailable(&mut text, unavailable);
         text

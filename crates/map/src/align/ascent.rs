@@ -69,6 +69,7 @@ impl Ascent {
         let mut height = overlap.at(std::slice::from_ref(&self.pose), stop)[0];
         self.lookups += overlap.lookups();
         for _ in 0..iterations_max {
+            stop.give_way();
             if stop.is_stopped() {
                 return;
             }

@@ -21,6 +21,10 @@ mod state {
     /// Checks nothing: of release builds.
     #[inline(always)]
     pub fn before_file_operation() {}
+
+    /// Checks nothing: of release builds.
+    #[inline(always)]
+    pub fn before_pause() {}
 }
 
 #[cfg(debug_assertions)]
@@ -85,6 +89,16 @@ mod state {
         assert!(POLLED.with(Cell::get) == 0, "a runtime thread starts a file operation");
     }
 
+    /// Checks that this thread may wait until others have done some of their work.
+    ///
+    /// # Panics
+    /// When it holds a lock, for which they may wait.
+    #[track_caller]
+    pub fn before_pause() {
+        let held = HELD.with(|held| held.borrow().last().copied());
+        assert!(held.is_none(), "a pause begins while the lock {held:?} is held");
+    }
+
     /// Counts a poll while it lives.
     pub(super) struct Polling;
 
@@ -102,7 +116,7 @@ mod state {
     }
 }
 
-pub use state::before_file_operation;
+pub use state::{before_file_operation, before_pause};
 pub(super) use state::{hold, may_wait};
 
 /// Tells the checks that whoever polls `future` is a runtime thread.

@@ -18,4 +18,4 @@ pub use excerpt::excerpt;
 pub use keyword::{Keyword, words};
 pub use prefetch::prefetch;
 pub use sorting::sort_by_key_until;
-pub use stop_signal::StopSignal;
+pub use stop_signal::{GiveWay, StopSignal};

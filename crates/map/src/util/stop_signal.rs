@@ -1,28 +1,67 @@
-//! When long work is to end early: its caller has gone, or its time is up.
+//! When long work is to end early: its caller has gone, or its time is up. And when it gives way to other work.
 
 use std::fmt::{Debug, Formatter};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+use crate::sync::before_pause;
+
+/// Lets other work go first, where some waits.
+pub trait GiveWay {
+    /// Returns when the work that calls this is to go on: at once, or after other work.
+    fn give_way(&self);
+
+    /// How long the work has waited here, in all.
+    fn paused_for(&self) -> Duration;
+}
 
 /// Tells long work when to end early. Every loop that may take longer than a few milliseconds asks it between its
 /// steps, and returns when it says so; what such work returns then means nothing, or is marked as cut short.
 #[derive(Clone, Copy)]
 pub struct StopSignal<'a> {
     is_cancelled: Option<&'a dyn Fn() -> bool>,
+    /// As if the work never paused.
     deadline: Option<Instant>,
+    turns: Option<&'a dyn GiveWay>,
 }
 
 impl<'a> StopSignal<'a> {
     /// Work that goes on to its end.
-    pub const NEVER: StopSignal<'static> = StopSignal { is_cancelled: None, deadline: None };
+    pub const NEVER: StopSignal<'static> = StopSignal { is_cancelled: None, deadline: None, turns: None };
 
     /// Stops work once `is_cancelled` says true, which it must then go on saying.
     pub fn when(is_cancelled: &'a dyn Fn() -> bool) -> Self {
-        Self { is_cancelled: Some(is_cancelled), deadline: None }
+        Self { is_cancelled: Some(is_cancelled), deadline: None, turns: None }
     }
 
-    /// Stops work at `deadline` as well, or earlier where this signal had an earlier one.
+    /// The same, where work lets other work go first by `turns`.
+    #[must_use]
+    pub fn giving_way_by(self, turns: &'a dyn GiveWay) -> Self {
+        Self { turns: Some(turns), ..self }
+    }
+
+    /// Lets other work go first, where some waits: to be called between the parts of long work, while no lock is held.
+    /// What time that takes counts for no deadline.
+    ///
+    /// # Panics
+    /// In tests, where a lock is held and the work is one that gives way.
+    #[track_caller]
+    pub fn give_way(self) {
+        if let Some(turns) = self.turns {
+            before_pause();
+            turns.give_way();
+        }
+    }
+
+    /// How long the work has let other work go first, in all.
+    pub fn paused_for(self) -> Duration {
+        self.turns.map_or(Duration::ZERO, GiveWay::paused_for)
+    }
+
+    /// Stops work at `deadline` as well, or earlier where this signal had an earlier one. The deadline moves on by as
+    /// long as the work pauses after this.
     #[must_use]
     pub fn by(self, deadline: Instant) -> Self {
+        let deadline = deadline.checked_sub(self.paused_for()).unwrap_or(deadline);
         Self { deadline: Some(self.deadline.map_or(deadline, |earlier| earlier.min(deadline))), ..self }
     }
 
@@ -33,7 +72,7 @@ impl<'a> StopSignal<'a> {
 
     /// True once the deadline has passed.
     pub fn is_time_up(self) -> bool {
-        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+        self.deadline.is_some_and(|deadline| Instant::now() >= deadline + self.paused_for())
     }
 
     /// True once the work is to end, for either reason.
@@ -88,6 +127,38 @@ mod tests {
             assert_eq!(StopSignal::when(&stops).pieces(&[0; 100], 10).flatten().count(), items);
             assert_eq!(looks.get(), expected);
         }
+    }
+
+    struct Paused(Cell<Duration>);
+    impl GiveWay for Paused {
+        fn give_way(&self) {
+            self.0.set(self.0.get() + Duration::from_secs(60));
+        }
+
+        fn paused_for(&self) -> Duration {
+            self.0.get()
+        }
+    }
+
+    #[test]
+    fn a_pause_moves_the_deadline() {
+        let (turns, begin) = (Paused(Cell::default()), Instant::now());
+        let signal = StopSignal::NEVER.giving_way_by(&turns);
+        let before = signal.by(begin - Duration::from_secs(30));
+        assert!(before.is_time_up());
+        before.give_way();
+        assert!(!before.is_time_up());
+        // A pause before it was set does not count.
+        assert!(signal.by(begin).is_time_up());
+        assert!(!signal.by(begin + Duration::from_secs(30)).is_time_up());
+    }
+
+    #[test]
+    #[should_panic(expected = "a pause begins while the lock")]
+    fn work_does_not_pause_while_it_holds_a_lock() {
+        let lock = crate::sync::Mutex::new(crate::sync::Rank::Brief, ());
+        let (_held, turns) = (lock.lock(), Paused(Cell::default()));
+        StopSignal::NEVER.giving_way_by(&turns).give_way();
     }
 
     #[test]

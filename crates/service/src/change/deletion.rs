@@ -12,7 +12,7 @@ use crate::request::{
     Deletion, DeletionAnswer, DeletionTarget, NotSeenSince, key_in_range, point_without_voxel,
 };
 use crate::resources::{BLOCK_BYTES, ResourceBudget, removal_bytes};
-use crate::work::{TimeLimit, check_not_stopped};
+use crate::work::{Requester, TimeLimit, check_not_stopped};
 use mrol_map::geometry::Point;
 use mrol_map::map::{
     CallerName, Change, Committed, DeletionRecord, MapName, MultiResolutionMap, Region, Request, RequestKind,
@@ -41,7 +41,7 @@ impl MapService {
             }
             // Who touched what since is read from the journal, as for an undo.
             let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
-            let pool = if reads_journal { &self.inner.pools.undo } else { &self.inner.pools.mapping };
+            let lane = if reads_journal { &self.inner.lanes.undo } else { &self.inner.lanes.mapping };
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             let (inner, deletion, caller) =
                 (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
@@ -52,7 +52,8 @@ impl MapService {
                 };
                 if reads_journal { limit.run(stop, submit) } else { submit(stop) }
             };
-            self.submit_and_wait(("DeleteVoxels", &of), pool, None, submit).await
+            self.submit_and_wait(("DeleteVoxels", &of), (lane, &Requester::from(&self.asker)), None, submit)
+                .await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| {
             Outcome::Changed(observer::Change::of_deletion(answer))

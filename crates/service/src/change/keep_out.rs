@@ -11,6 +11,7 @@ use crate::maps::HostedMap;
 use crate::observer::{Change, Outcome};
 use crate::request::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
 use crate::resources::ResourceBudget;
+use crate::work::Requester;
 use mrol_map::map::{
     self, Committed, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, KeepOuts, MapName,
     MultiResolutionMap, Request, RequestId, RequestKind,
@@ -58,7 +59,7 @@ impl MapService {
     pub async fn list_keep_outs(&self, map: &MapName) -> Result<KeepOutList, ServiceError> {
         let work = async {
             let map = self.map(map)?;
-            self.inner.pools.queries.run(move |_| map.list_keep_outs()).await
+            self.inner.lanes.reads.run(&self.asker, move |_| map.list_keep_outs()).await
         };
         self.observed("ListKeepOuts", Some(map), work, |_| Outcome::Read).await
     }
@@ -77,7 +78,8 @@ impl MapService {
         let submit = move |_: StopSignal<'_>| {
             map.submit_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
         };
-        self.submit_and_wait(("ChangeKeepOut", &of), &self.inner.pools.mapping, None, submit).await
+        let lane = (&self.inner.lanes.mapping, &Requester::from(&self.asker));
+        self.submit_and_wait(("ChangeKeepOut", &of), lane, None, submit).await
     }
 }
 

@@ -12,7 +12,7 @@ use crate::maps::HostedMap;
 use crate::observer::{self, Outcome};
 use crate::request::{Undo, UndoAnswer, UndoTarget, scan_id_too_old, scan_name};
 use crate::resources::{Reservation, ResourceBudget, growth_bytes, removal_bytes};
-use crate::work::{TimeLimit, check_not_stopped, ended_early};
+use crate::work::{Requester, TimeLimit, check_not_stopped, ended_early};
 use mrol_map::map::{
     CallerName, Change, Committed, CompletedRequest, KnownScan, MapName, MultiResolutionMap, Request,
     RequestKind, Reversal, UndoRecord, WithdrawnChange,
@@ -71,13 +71,13 @@ impl MapService {
             let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             // Until its outcome is known: what was withdrawn before it is then what it found.
-            let pool = &self.inner.pools.undo;
-            let _undo = pool.in_turn(map.lock_undo()).await?;
+            let (lane, requester) = (&self.inner.lanes.undo, Requester::from(&self.asker));
+            let _undo = lane.once_free(&self.asker, map.lock_undo()).await?;
             // A thread first: the robot's scans wait for this undo, and not for those of other maps.
-            let thread = pool.thread().await?;
+            let thread = lane.thread(&requester).await?;
             let _robot = map.lock_robot_of(&undo.target).await;
             let of = Arc::clone(&map);
-            self.submit_and_wait(("Undo", &of), pool, Some(thread), move |stop| {
+            self.submit_and_wait(("Undo", &of), (lane, &requester), Some(thread), move |stop| {
                 limit.run(stop, |stop| map.submit_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
             })
             .await

@@ -73,9 +73,14 @@ impl MapService {
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let work = async {
             let maps = self.inner.catalog.within(&self.allowed_maps);
-            let describe =
-                move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
-            self.inner.pools.queries.run(describe).await?
+            let describe = move |stop: StopSignal<'_>| {
+                let described = maps.iter().map(|map| {
+                    stop.give_way();
+                    map.describe(RATE_SAMPLES, stop)
+                });
+                described.collect()
+            };
+            self.inner.lanes.reads.run(&self.asker, describe).await?
         };
         self.observed("ListMaps", None, work, |_| Outcome::Read).await
     }
@@ -119,9 +124,9 @@ impl MapService {
         let work = async {
             let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
             self.inner
-                .pools
+                .lanes
                 .map_files
-                .run(move |stop| map.to_file(&inner.budget, &inner.settings.limits, stop))
+                .run(&self.asker, move |stop| map.to_file(&inner.budget, &inner.settings.limits, stop))
                 .await?
         };
         self.observed("SnapshotMap", Some(name), work, |_| Outcome::Read).await
@@ -154,7 +159,7 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let build =
                 move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
-            let built = self.inner.pools.map_files.run(build).await??;
+            let built = self.inner.lanes.map_files.run(&self.asker, build).await??;
             let inner = Arc::clone(&self.inner);
             let maps_max = self.limits().maps_max;
             let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
@@ -194,11 +199,11 @@ impl MapService {
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.inner.pools.queries.run(move |stop| map.describe(RATE_SAMPLES, stop)).await?
+        self.inner.lanes.reads.run(&self.asker, move |stop| map.describe(RATE_SAMPLES, stop)).await?
     }
 }
 
-/// Describes a map that was just made, on no pool: who made it is told so, whatever the server has to do besides.
+/// Describes a map that was just made, on no lane: who made it is told so, whatever the server has to do besides.
 async fn describe_made(map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
     let described = tokio::task::spawn_blocking(move || map.describe(RATE_SAMPLES, StopSignal::NEVER));
     described.await.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()))
@@ -218,6 +223,7 @@ mod tests {
     use crate::limits::Limits;
     use crate::map_service::MapService;
     use crate::settings::ServiceSettings;
+    use crate::work::Asker;
     use mrol_store::OpeningProgress;
 
     #[tokio::test(flavor = "multi_thread")]
@@ -232,11 +238,11 @@ mod tests {
         let held = std::sync::Mutex::new(held);
         let inner = Arc::clone(&service.inner);
         let first = tokio::spawn(async move {
-            inner.pools.queries.run(move |_| held.lock().unwrap().recv().is_ok()).await
+            inner.lanes.reads.run(&Asker::default(), move |_| held.lock().unwrap().recv().is_ok()).await
         });
         let inner = Arc::clone(&service.inner);
-        let second = tokio::spawn(async move { inner.pools.queries.run(|_| ()).await });
-        let waiting = || service.pools().iter().find(|pool| pool.name == "query").unwrap().waiting;
+        let second = tokio::spawn(async move { inner.lanes.reads.run(&Asker::default(), |_| ()).await });
+        let waiting = || service.lanes().iter().find(|lane| lane.name == "read").unwrap().waiting;
         while waiting() == 0 {
             tokio::task::yield_now().await;
         }

@@ -97,6 +97,8 @@ pub struct Limits {
     pub planning_field_bytes_max: usize,
     /// How long a question of a planner may take, while changes of the map wait for it. 0.5 s.
     pub question_time_max_s: f64,
+    /// Time of a question that is answered in parts, seconds: each part takes `question_time_max_s` at most.
+    pub long_question_time_max_s: f64,
     /// Cells of one 2-D grid. 4,000,000.
     pub grid_cells_max: usize,
     /// Voxels of a box in which frontiers are looked for. 4,000,000.
@@ -204,6 +206,7 @@ impl Default for Limits {
             ignored_regions_max: 64,
             planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
             question_time_max_s: 0.5,
+            long_question_time_max_s: 10.0,
             grid_cells_max: 4_000_000,
             frontier_cells_max: 4_000_000,
             frontiers_max: 1000,

@@ -56,13 +56,17 @@ impl MapService {
                 return answer;
             }
             let inner = Arc::clone(&self.inner);
-            let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
+            let limits = self.limits();
+            let limit = match question.is_in_parts() {
+                true => TimeLimit::new("long_question_time_max", limits.long_question_time_max_s),
+                false => TimeLimit::new("question_time_max", limits.question_time_max_s),
+            };
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
                 let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
                 limit.run(stop, |stop| map.answer_question(&map.questioned(limits), &question, limits, stop))
             };
-            self.inner.pools.planning.run_for(&self.asker, answer).await?
+            self.inner.lanes.planning.run(&self.asker, answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
@@ -75,7 +79,7 @@ impl MapService {
         }
         let inner = Arc::clone(&self.inner);
         let check = move |_: StopSignal<'_>| question.check(&inner.settings.limits).map(|()| question);
-        self.inner.pools.planning.run_for(&self.asker, check).await?
+        self.inner.lanes.planning.run(&self.asker, check).await?
     }
 }
 
@@ -89,7 +93,7 @@ impl Inner {
     ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
         let limits = &self.settings.limits;
         let is_small = question.work_ns() <= INLINE_NS && bytes_of(question, limits) <= INLINE_BYTES;
-        if !is_small || self.pools.planning.is_wanted() {
+        if !is_small || self.lanes.planning.is_wanted() {
             return None;
         }
         let stop = StopSignal::NEVER.by(Instant::now() + INLINE_TIME_MAX);
@@ -182,7 +186,7 @@ mod tests {
             map.committer().exchange(&VoxelSet::default(), &VoxelKey::new(index).into_iter().collect());
         };
         let handed_over =
-            || service.pools().iter().find(|pool| pool.name == "planning").map_or(0, |pool| pool.begun);
+            || service.lanes().iter().find(|lane| lane.name == "planning").map_or(0, |lane| lane.begun);
         let ask = async || service.ask(&name, pose_check()).await.unwrap().answer.words();
         for (index, expected) in [([3, 0, 0], 0), ([1, 0, 0], 1)] {
             put(index);

@@ -32,13 +32,19 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// How long finding the answer takes, roughly, nanoseconds.
     fn work_ns(&self) -> usize;
 
+    /// True where the answer is found in parts, between which changes may come.
+    fn is_in_parts(&self) -> bool {
+        false
+    }
+
     /// Checks it against the server's limits.
     ///
     /// # Errors
     /// `InvalidArgument`, naming the field, the value and the limit.
     fn check(&self, limits: &Limits) -> Result<(), ServiceError>;
 
-    /// The answer from one view of `map`, with the version that it is of.
+    /// The answer from one view of `map`, with the version that it is of. Of one that is found in parts, the version is
+    /// that of the first; the others may be of later ones.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was;

@@ -1,10 +1,12 @@
 //! A map that questions are asked of, the server's or a replica's.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::asked::Asked;
 use crate::error::ServiceError;
-use crate::work::{check_not_stopped, ended_early};
+use crate::limits::Limits;
+use crate::work::{TimeLimit, check_not_stopped, ended_early};
 use mrol_map::map::{ContentVersion, MapView, MultiResolutionMap};
 use mrol_map::planning::{Planner, PlanningView, Surroundings, Unknown};
 use mrol_map::util::StopSignal;
@@ -93,5 +95,32 @@ impl<'a> QuestionedMap<'a> {
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))
+    }
+
+    /// The answers that `f` makes of parts of so many `elements`, each in a view of the whole map as it is then and
+    /// within `question_time_max_s`, with the version of the first. Between them changes may begin, and other work goes
+    /// first.
+    pub(super) fn in_parts<A>(
+        &self,
+        asked: &Asked,
+        (elements, of_part): (usize, usize),
+        limits: &Limits,
+        stop: StopSignal<'_>,
+        mut f: impl FnMut(&MapView<'_>, Range<usize>, StopSignal<'_>) -> Result<A, ServiceError>,
+    ) -> Result<(Vec<A>, ContentVersion), ServiceError> {
+        let (mut answers, mut first) = (Vec::new(), None);
+        // One part of a question of nothing, too: its answer has a version.
+        for start in (0..elements.max(1)).step_by(of_part) {
+            stop.give_way();
+            check_not_stopped(stop)?;
+            let limit = TimeLimit::new("question_time_max", limits.question_time_max_s);
+            let range = start..elements.min(start + of_part);
+            let (answer, version) = limit
+                .run(stop, |stop| self.in_view(asked, range.len(), stop, |view| f(view, range, stop)))?;
+            answers.push(answer);
+            first.get_or_insert(version);
+        }
+        let version = first.unwrap_or_else(|| self.map.content_version());
+        Ok((answers, version))
     }
 }

@@ -37,7 +37,7 @@ impl MapService {
                 let reserve = |bytes| inner.budget.reserve_transient(bytes, BLOCK);
                 request.answer_in(&map.map, map.uuid, &inner.settings.limits, reserve, stop)
             };
-            self.inner.pools.blocks.run_for(&self.asker, make).await?
+            self.inner.lanes.blocks.run(&self.asker, make).await?
         };
         self.observed("GetBlock", Some(map), work, |_| Outcome::Read).await
     }

@@ -29,7 +29,7 @@ impl MapService {
                 true => map.count(&request, most, stop),
                 false => map.list(&request, most, stop),
             };
-            self.inner.pools.queries.run(list).await?
+            self.inner.lanes.queries.run(&self.asker, list).await?
         };
         self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }
@@ -64,7 +64,10 @@ impl HostedMap {
         let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
         let mut keys = Vec::with_capacity((copy.len() + kept_out.len()).min(most));
         let is_other = |key: &VoxelKey| kept_out.is_empty() || !kept_out.contains(*key);
-        copy.for_some(stop, |some| keys.extend(some.iter().copied().filter(is_other)));
+        copy.for_some(stop, |some| {
+            keys.extend(some.iter().copied().filter(is_other));
+            stop.give_way();
+        });
         check_not_stopped(stop)?;
         let found = keys.len() + kept_out.len();
         if found > most {

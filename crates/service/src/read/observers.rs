@@ -49,7 +49,7 @@ impl MapService {
                 let search = Search { map: &map, folder: &folder, voxel, level: request.level, stop };
                 search.observers(limits, &inner.budget)
             };
-            self.inner.pools.observers.run_for(&self.asker, find).await?
+            self.inner.lanes.observers.run(&self.asker, find).await?
         };
         self.observed("ListObservers", Some(map), work, |_| Outcome::Read).await
     }
@@ -126,6 +126,7 @@ impl Search<'_> {
         let _segment = budget.reserve_transient(bytes, OBSERVERS)?;
         let mut touching = Vec::new();
         for record in self.folder.records_of_part(part) {
+            self.stop.give_way();
             if self.stop.is_stopped() {
                 return Ok(None);
             }

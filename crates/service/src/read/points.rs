@@ -36,7 +36,7 @@ impl MapService {
     /// `NotFound`; `DeadlineExceeded` when `min_revision` does not come; `FailedPrecondition` when the map has
     /// another uuid.
     pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ServiceError> {
-        let lookup = query.lookup;
+        let (lookup, points, keep_out) = (query.lookup, query.points.len(), query.keep_out);
         let work = async {
             let map = self.map(map)?;
             self.limits().check_points(query.points.len())?;
@@ -56,7 +56,7 @@ impl MapService {
             }
             let inner = Arc::clone(&self.inner);
             let answer = move |stop: StopSignal<'_>| map.query(&query, &inner.settings.limits, stop);
-            self.inner.pools.queries.run(answer).await?
+            self.inner.lanes.for_points(points, keep_out).run(&self.asker, answer).await?
         };
         self.observed("QueryPoints", Some(map), work, |answer| Outcome::Points {
             lookup,

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::events::PendingEvent;
 use super::submit::{Effort, Judged};
-use crate::error::ServiceError;
+use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::maps::HostedMap;
 use crate::observer::{Change, JudgedScan, Outcome};
 use crate::request::{ScanAnswer, ScanRequest};
-use crate::work::{Pools, TimeLimit};
+use crate::work::{Lanes, TimeLimit};
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
@@ -58,8 +58,10 @@ impl MapService {
         if map.is_new(scan) {
             self.inner.budget.check_to_grow()?;
         }
-        let robot_lock =
-            Arc::new(self.inner.pools.mapping.in_turn(map.robots.lock_robot(&scan.robot)).await?);
+        let Lanes { mapping, long_mapping, .. } = &self.inner.lanes;
+        let requester = self.asker.for_robot(&scan.robot);
+        let robot_lock = mapping.once_free(&self.asker, map.robots.lock_robot(&scan.robot)).await?;
+        let robot_lock = Arc::new(robot_lock);
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
         let submit = |effort| {
             let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(map), Arc::clone(scan));
@@ -72,17 +74,19 @@ impl MapService {
                 })
             }
         };
-        let Pools { mapping, long_mapping, .. } = &self.inner.pools;
-        let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
-        loop {
-            if let Some(judged) =
-                self.submit_and_wait(("InsertScan", map), pool, thread.take(), submit(effort)).await?
-            {
-                return Ok(judged);
-            }
-            (pool, effort) = (long_mapping, Effort::Whole);
-            thread = Some(limit.wait(pool.thread()).await??);
+        let (of, at_first) = (("InsertScan", map), submit(Effort::OneStart));
+        if let Some(judged) = self.submit_and_wait(of, (mapping, &requester), None, at_first).await? {
+            return Ok(judged);
         }
+        // What keeps failing gives way to what may succeed.
+        let thread = limit.wait(long_mapping.thread(&requester)).await??;
+        let lane = (long_mapping, &requester);
+        let judged = self.submit_and_wait(of, lane, Some(thread), submit(Effort::Whole)).await;
+        long_mapping.note(
+            &requester,
+            judged.as_ref().is_ok_and(|judged| judged.as_ref().is_some_and(|judged| judged.answer.accepted)),
+        );
+        judged?.ok_or_else(|| ServiceError::new(Reason::JobPanicked, "the scan was not judged"))
     }
 
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
@@ -96,11 +100,12 @@ impl MapService {
             scan.check_alignment()?;
             scan.check_points(self.limits())?;
             let inner = Arc::clone(&self.inner);
+            let requester = self.asker.for_robot(&scan.robot);
             let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);
             let align = move |stop: StopSignal<'_>| {
                 limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
             };
-            self.inner.pools.alignment.run(align).await?
+            self.inner.lanes.alignment.run(requester, align).await?
         };
         self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
     }
@@ -108,14 +113,13 @@ impl MapService {
 
 #[cfg(test)]
 mod tests {
-    use crate::error::Reason;
+    use super::*;
     use crate::limits::Limits;
-    use crate::map_service::MapService;
-    use crate::request::{PointCloud, ScanRequest};
+    use crate::request::PointCloud;
     use crate::settings::ServiceSettings;
     use crate::work::Asker;
     use mrol_map::geometry::{Point, Pose};
-    use mrol_map::map::{MapName, MapSettings, RobotName};
+    use mrol_map::map::{MapSettings, RobotName};
     use mrol_map::mapping::Guess;
     use mrol_store::OpeningProgress;
 

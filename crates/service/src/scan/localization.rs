@@ -173,7 +173,7 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let search =
                 move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.budget, stop);
-            self.inner.pools.localization.run(search).await?
+            self.inner.lanes.localization.run(&self.asker, search).await?
         };
         self.observed("Localize", Some(map), work, |_| Outcome::Read).await
     }

@@ -1,7 +1,7 @@
 //! The search for lost robots, beside everything else that the server does.
 //!
 //! A robot that asked for it (see [`RobotSettings::recover`](crate::RobotSettings)) is searched for after a scan of it
-//! was refused: on a thread of its own that gives way to all others. The answer to the scan does not wait for it.
+//! was refused: on threads of their own that give way to all others, and in turn. The answer to the scan does not wait for it.
 //! Whether the robot is where the search saw it, its next scan tells.
 
 use std::sync::Arc;
@@ -22,29 +22,25 @@ use mrol_map::util::StopSignal;
 const WHOM: &str = "a search for a lost robot";
 
 impl MapService {
-    /// Begins to search for the robot of a scan that was refused, if it asked for it and nobody waits for a
-    /// search of their own.
+    /// Begins to search for the robot of a scan that was refused, if it asked for it.
     pub(super) fn search_for_robot_of(&self, map: Arc<HostedMap>, request: &ScanRequest) {
         let inner = Arc::clone(&self.inner);
         if !inner.settings.recovers(request) {
             return;
         }
-        if inner.pools.localization.is_wanted() {
-            return;
-        }
         let (robot, method) = (request.robot.clone(), request.method);
-        let pool = Arc::clone(&self.inner);
+        let (of_lanes, requester) = (Arc::clone(&self.inner), self.asker.for_robot(&robot));
         tokio::spawn(async move {
-            let search = move |_: StopSignal<'_>| {
-                let (settings, is_wanted) = (&inner.settings, || inner.pools.localization.is_wanted());
+            let search = move |stop: StopSignal<'_>| {
+                let settings = &inner.settings;
                 let mapper = map.mapper(method, true, settings);
                 if let Some(task) = mapper.begin_search(&robot) {
-                    map.search(&mapper, &task, settings, &inner.budget, StopSignal::when(&is_wanted));
+                    map.search(&mapper, &task, settings, &inner.budget, stop);
                 }
             };
-            // Nobody waits for the answer. What came of it is noted with the robot; where others are searched for, the
-            // next scan asks again.
-            drop(pool.pools.recovery.run(search).await);
+            // Nobody waits for the answer. What came of it is noted with the robot; where many others are searched for,
+            // the next scan asks again.
+            drop(of_lanes.lanes.recovery.run(requester, search).await);
         });
     }
 }

@@ -35,7 +35,7 @@ impl MapService {
                 let (trajectory, version) = map.map.trajectory_and_version();
                 page(&trajectory, map.version(version), &query, most)
             };
-            self.inner.pools.queries.run(page_of).await
+            self.inner.lanes.queries.run(&self.asker, page_of).await
         };
         self.observed("GetTrajectory", Some(map), work, |_| Outcome::Read).await
     }
@@ -54,7 +54,8 @@ impl MapService {
             let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
             let map = self.map(map)?;
             let shared = Arc::clone(&map);
-            let copy = self.inner.pools.queries.run(move |_| shared.map.trajectory_and_version()).await?;
+            let copy = move |_: StopSignal<'_>| shared.map.trajectory_and_version();
+            let copy = self.inner.lanes.queries.run(&self.asker, copy).await?;
             let (trajectory, version) = copy;
             let version = map.version(version);
             Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
@@ -100,8 +101,8 @@ impl TrajectoryPieces {
         }
         let most = self.left.map_or(POSES_PER_PIECE, |left| left.min(POSES_PER_PIECE));
         let (trajectory, version, query) = (self.trajectory.clone(), self.version, self.query.clone());
-        let piece =
-            self.service.inner.pools.queries.run(move |_| page(&trajectory, version, &query, most)).await;
+        let page_of = move |_: StopSignal<'_>| page(&trajectory, version, &query, most);
+        let piece = self.service.inner.lanes.queries.run(&self.service.asker, page_of).await;
         Some(piece.map(|piece| self.follow(piece)).inspect_err(|_| self.ended = true))
     }
 

@@ -104,7 +104,7 @@ impl Watch {
         let (map, inner) = (Arc::clone(&self.map), Arc::clone(&self.service.inner));
         let form = self.watched.form;
         let make = move |stop: StopSignal<'_>| map.whole_state(form, &inner.budget, stop);
-        let state = self.service.inner.pools.watch.run(make).await??;
+        let state = self.service.inner.lanes.watch.run(&self.service.asker, make).await??;
         let revision = state.version.revision;
         let is_durable = tokio::select! {
             biased;
@@ -136,7 +136,7 @@ impl Watch {
         // What takes long keeps no thread of the runtime.
         let parts = match is_small {
             true => parts(),
-            false => self.service.inner.pools.watch.run(move |_| parts()).await?,
+            false => self.service.inner.lanes.watch.run(&self.service.asker, move |_| parts()).await?,
         };
         self.told = parts.is_some().then_some(revision);
         self.parts = parts.map_or(Parts::Nothing, Parts::Change);
@@ -165,7 +165,7 @@ impl Watch {
             }
             batch
         };
-        self.read = self.service.inner.pools.watch.run(read).await?;
+        self.read = self.service.inner.lanes.watch.run(&self.service.asker, read).await?;
         Ok(())
     }
 

@@ -3,6 +3,8 @@
 use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::sync::Arc;
 
+use mrol_map::map::RobotName;
+
 /// Whom a request counts for: a key, or the place that it came from where there is none. By default that of what the
 /// process does itself.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -23,6 +25,11 @@ impl Asker {
     pub fn as_str(&self) -> &str {
         &self.0
     }
+
+    /// The same asker, for one of its robots.
+    pub(crate) fn for_robot(&self, robot: &RobotName) -> Requester {
+        Requester { asker: self.clone(), robot: Some(robot.clone()) }
+    }
 }
 
 impl Default for Asker {
@@ -34,5 +41,25 @@ impl Default for Asker {
 impl Display for Asker {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         f.write_str(&self.0)
+    }
+}
+
+/// Whose turn a job takes: an asker takes turns with other askers, and each of its robots with its other robots.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Requester {
+    pub(in crate::work) asker: Asker,
+    /// None of requests that are of no robot, which take turns with the asker's robots as one of them.
+    pub(in crate::work) robot: Option<RobotName>,
+}
+
+impl From<&Asker> for Requester {
+    fn from(asker: &Asker) -> Self {
+        Self { asker: asker.clone(), robot: None }
+    }
+}
+
+impl From<&Requester> for Requester {
+    fn from(requester: &Requester) -> Self {
+        requester.clone()
     }
 }

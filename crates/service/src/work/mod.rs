@@ -1,13 +1,19 @@
-//! Threads for work that uses the CPU: pools, fair queues before them, and limits of time.
+//! Threads for work that uses the CPU: lanes, the fair queues before them, and limits of time.
 
 mod asker;
+mod failures;
 mod fair_queue;
-mod pool;
-mod pools;
+mod lane;
+mod lanes;
+mod pause;
+mod precedence;
+mod shares;
+mod threads;
 mod time_limit;
 
 pub use asker::Asker;
-pub use pool::PoolUse;
-pub(crate) use pool::{FreeThread, Pool};
-pub(crate) use pools::Pools;
+pub(crate) use asker::Requester;
+pub use lane::LaneUse;
+pub(crate) use lane::{FreeThread, Lane};
+pub(crate) use lanes::Lanes;
 pub(crate) use time_limit::{TimeLimit, check_not_stopped, ended_early};

@@ -1,18 +1,20 @@
 //! How long one request may take of the threads for work that uses the CPU.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
 
 use crate::error::{Reason, ServiceError};
 use mrol_map::util::StopSignal;
 
 /// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
-/// deadline bounds. A clone is the same limit of the same request.
+/// deadline bounds. The time while it gives way to others does not count. A clone is the same limit of the same request.
 #[derive(Debug, Clone)]
 pub(crate) struct TimeLimit {
     name: &'static str,
     most: Duration,
-    ends: Arc<OnceLock<Instant>>,
+    ends: Arc<Mutex<Option<Instant>>>,
 }
 
 impl TimeLimit {
@@ -27,7 +29,17 @@ impl TimeLimit {
         stop: StopSignal<'_>,
         job: impl FnOnce(StopSignal<'_>) -> Result<T, ServiceError>,
     ) -> Result<T, ServiceError> {
-        job(stop.by(*self.ends.get_or_init(|| Instant::now() + self.most))).map_err(|error| self.named(error))
+        let (ends, paused_for) = (self.ends(), stop.paused_for());
+        let done = job(stop.by(ends));
+        let paused_for = stop.paused_for().saturating_sub(paused_for);
+        let moved = self.ends() + paused_for;
+        *self.ends.lock() = Some(moved);
+        done.map_err(|error| self.named(error))
+    }
+
+    /// When the time is up: it begins now, unless it did before.
+    fn ends(&self) -> Instant {
+        *self.ends.lock().get_or_insert_with(|| Instant::now() + self.most)
     }
 
     /// Waits for `turn`, for as long as is left.
@@ -35,7 +47,7 @@ impl TimeLimit {
     /// # Errors
     /// The limit, once it is over.
     pub(crate) async fn wait<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
-        let ends = *self.ends.get_or_init(|| Instant::now() + self.most);
+        let ends = self.ends();
         let waited = tokio::time::timeout_at(ends.into(), turn).await;
         waited.map_err(|_| self.named(ServiceError::new(Reason::TimeLimit, "")))
     }
@@ -89,7 +101,7 @@ mod tests {
         let limit = TimeLimit::new("undo_time_max", 3600.0);
         let ends = |limit: &TimeLimit| {
             limit.run(StopSignal::NEVER, |_| Ok(())).unwrap();
-            *limit.ends.get().unwrap()
+            limit.ends()
         };
         let first = ends(&limit);
         assert_eq!(ends(&limit.clone()), first);

@@ -226,10 +226,11 @@ impl<'a, 's> Search<'a, 's> {
         self.look()
     }
 
-    /// Checks the stop signal and reports progress; breaks when the search is to end.
+    /// Gives way to others and checks the stop signal; breaks when the search is to end.
     fn look(&mut self) -> ControlFlow<()> {
         self.since_look = 0;
         let Supervision { stop, search_stop, .. } = &self.supervision;
+        stop.give_way();
         if stop.is_stopped() || search_stop.is_stopped() {
             ControlFlow::Break(())
         } else {

@@ -59,6 +59,7 @@ pub(in crate::align) fn refine(
     for stage in (0..settings.stages).rev() {
         gaussians.soften(softness(stage));
         for _ in 0..settings.iterations_per_stage_max {
+            stop.give_way();
             if stop.is_stopped() {
                 return refined;
             }

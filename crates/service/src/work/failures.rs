@@ -1,0 +1,97 @@
+//! Whose long work has come to nothing lately.
+
+use std::collections::HashMap;
+
+use parking_lot::Mutex;
+
+use super::asker::Requester;
+
+/// As many failures without a success between them, and work gives way.
+const FAILURES_MAX: u32 = 3;
+/// Requesters that are remembered: of more, those who failed longest ago are forgotten.
+const REMEMBERED_MAX: usize = 1024;
+
+/// Requesters whose work failed, with the failures since their last success.
+#[derive(Debug, Default)]
+pub(super) struct Failures(Mutex<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    of: HashMap<Requester, Failed>,
+    noted: u64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Failed {
+    times: u32,
+    last: u64,
+}
+
+impl Failures {
+    /// Notes how work ended, for the robot and for its asker, who may send under a new name each time.
+    pub(super) fn note(&self, requester: &Requester, succeeded: bool) {
+        let mut state = self.0.lock();
+        state.noted += 1;
+        let last = state.noted;
+        for who in [requester.clone(), Requester::from(&requester.asker)] {
+            if succeeded {
+                state.of.remove(&who);
+                continue;
+            }
+            let failed = state.of.entry(who).or_default();
+            *failed = Failed { times: failed.times.saturating_add(1), last };
+        }
+        while state.of.len() > REMEMBERED_MAX {
+            let oldest = state.of.iter().min_by_key(|(_, failed)| failed.last).map(|(who, _)| who.clone());
+            oldest.and_then(|who| state.of.remove(&who));
+        }
+    }
+
+    /// True of a robot, or an asker, of whom nothing succeeded the last times.
+    pub(super) fn is_failing(&self, requester: &Requester) -> bool {
+        let state = self.0.lock();
+        let fails = |who: &Requester| state.of.get(who).is_some_and(|failed| failed.times >= FAILURES_MAX);
+        fails(requester) || fails(&Requester::from(&requester.asker))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::work::Asker;
+    use mrol_map::map::RobotName;
+
+    #[test]
+    fn who_fails_again_and_again_is_failing_until_it_succeeds_whatever_the_robots_name() {
+        let (failures, asker) = (Failures::default(), Asker::with_key("one"));
+        let robot = |name: &str| asker.for_robot(&RobotName::new(name).unwrap());
+        for n in 0..FAILURES_MAX {
+            assert!(!failures.is_failing(&robot("new")), "after {n}");
+            failures.note(&robot(&format!("r{n}")), false);
+        }
+        assert!(failures.is_failing(&robot("new")));
+        assert!(!failures.is_failing(&Requester::from(&Asker::with_key("other"))));
+        failures.note(&robot("good"), true);
+        assert!(!failures.is_failing(&robot("new")));
+        // A robot that fails is one among those that do not.
+        for _ in 0..FAILURES_MAX {
+            failures.note(&robot("bad"), false);
+            failures.note(&robot("good"), true);
+        }
+        assert!(failures.is_failing(&robot("bad")));
+        assert!(!failures.is_failing(&robot("good")));
+    }
+
+    #[test]
+    fn no_more_are_remembered_than_may_and_the_newest_are() {
+        let failures = Failures::default();
+        let asker = |n: usize| Requester::from(&Asker::at(n));
+        for _ in 0..FAILURES_MAX {
+            (0..REMEMBERED_MAX).for_each(|n| failures.note(&asker(n), false));
+        }
+        failures.note(&asker(REMEMBERED_MAX), false);
+        assert_eq!(failures.0.lock().of.len(), REMEMBERED_MAX);
+        assert!(!failures.is_failing(&asker(0)));
+        assert!(failures.is_failing(&asker(1)));
+    }
+}

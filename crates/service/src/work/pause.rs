@@ -1,0 +1,46 @@
+//! How a job of a lane gives way between its parts.
+
+use std::cell::{Cell, RefCell};
+use std::time::{Duration, Instant};
+
+use super::fair_queue::{FairQueue, HeldThread};
+use super::threads::Threads;
+use mrol_map::util::GiveWay;
+
+/// A part of long work: after so long it gives way, where somebody else waits.
+pub(super) const PART: Duration = Duration::from_millis(25);
+/// A part of the work of somebody whose work fails again and again.
+pub(super) const PART_OF_FAILING: Duration = Duration::from_millis(5);
+
+/// The thread of a job in hand, which the job gives back between its parts.
+pub(super) struct Pauses<'a> {
+    pub(super) queue: &'a FairQueue,
+    pub(super) threads: &'a Threads,
+    pub(super) part: Duration,
+    pub(super) held: RefCell<HeldThread>,
+    pub(super) paused_for: Cell<Duration>,
+}
+
+impl GiveWay for Pauses<'_> {
+    fn give_way(&self) {
+        let mut held = self.held.borrow_mut();
+        if held.held_for() < self.part || !self.queue.may_pause(&held) {
+            return;
+        }
+        // Who takes the turn needs a thread of the system besides this one, which waits.
+        if self.threads.have(self.queue.threads_wanted()).is_err() {
+            return;
+        }
+        let begin = Instant::now();
+        let Some(turn) = self.queue.pause(&mut held) else { return };
+        // The queue gives a thread to everybody who waits, and refuses nobody who was begun.
+        if let Ok(thread) = turn.blocking_recv() {
+            *held = thread;
+        }
+        self.paused_for.set(self.paused_for.get() + begin.elapsed());
+    }
+
+    fn paused_for(&self) -> Duration {
+        self.paused_for.get()
+    }
+}

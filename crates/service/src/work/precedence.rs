@@ -1,0 +1,58 @@
+//! Work that has precedence over a lane: while there is some, the lane uses a part of its threads.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
+
+/// For so long after it, work that has precedence counts as there: a robot scans several times a second.
+const LINGERS: Duration = Duration::from_secs(1);
+
+/// Work that has precedence. A clone is another handle on the same work.
+#[derive(Debug, Clone)]
+pub(super) struct Precedence {
+    lingers: Duration,
+    state: Arc<Mutex<State>>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    at_work: usize,
+    last_end: Option<Instant>,
+}
+
+/// A job that has precedence, until this is dropped.
+#[derive(Debug)]
+pub(super) struct AtWork(Precedence);
+
+impl Default for Precedence {
+    fn default() -> Self {
+        Self::lingering(LINGERS)
+    }
+}
+
+impl Precedence {
+    /// Work that counts for so long after its end.
+    pub(super) fn lingering(lingers: Duration) -> Self {
+        Self { lingers, state: Arc::default() }
+    }
+
+    pub(super) fn begin(&self) -> AtWork {
+        self.state.lock().at_work += 1;
+        AtWork(self.clone())
+    }
+
+    /// True while a job is in hand, and a while after the last.
+    pub(super) fn is_taken(&self) -> bool {
+        let state = self.state.lock();
+        state.at_work > 0 || state.last_end.is_some_and(|end| end.elapsed() < self.lingers)
+    }
+}
+
+impl Drop for AtWork {
+    fn drop(&mut self) {
+        let mut state = self.0.state.lock();
+        state.at_work -= 1;
+        state.last_end = Some(Instant::now());
+    }
+}
