@@ -31,6 +31,8 @@ pub struct RobotConfig {
     pub body_m: Option<[[f64; 3]; 2]>,
     /// Points at exactly 0 0 0 count as any other. false: they are skipped, since most drivers write them where nothing returned.
     pub keep_zeros: bool,
+    /// Points beyond `range_max_m` say nothing. false: they tell that nothing was met up to there.
+    pub beyond_range_is_noise: bool,
     /// Look for the robot where its scans are refused. false.
     pub recover: bool,
     /// Take out of the map what the robot's scans saw through. false.
@@ -58,6 +60,7 @@ impl Default for RobotConfig {
             no_return_m: None,
             body_m: None,
             keep_zeros: false,
+            beyond_range_is_noise: false,
             recover: false,
             carve: false,
             carve_margin_voxels: margin_voxels,
@@ -104,6 +107,7 @@ impl RobotConfig {
             no_return_m: self.no_return_m,
             body_m,
             keep_zeros: self.keep_zeros,
+            beyond_range_is_noise: self.beyond_range_is_noise,
         }
     }
 }

@@ -95,6 +95,7 @@ impl ScanFields<'_> {
                 no_return_m: None,
                 body_m: self.body_m,
                 keep_zeros: false,
+                beyond_range_is_noise: false,
             },
             strict: self.strict,
             ..ScanRequest::new(robot, points_of(points))

@@ -96,7 +96,7 @@ fn viewpoint_at(map: &MultiResolutionMap, origin: &Pose, stop: StopSignal<'_>) -
         })
         .collect();
     let ends = within_extent(&ends, map.lattice().extent_m(), stop);
-    let sweep = Sweep { range_max_m: RANGE_MAX_M as f32, moved_m: 0.0 };
+    let sweep = Sweep::standing(RANGE_MAX_M as f32);
     let image = RangeImage::of_points(&ends, sweep, IMAGE_BYTES_MAX)?;
     Some(Viewpoint::new(Pose::from(origin.translation), image))
 }

@@ -14,6 +14,8 @@ pub struct FilteredPoints {
     surroundings: TimedPoints,
     /// Up to where points that are too far tell that nothing was met, see [`PointFilter::passed_to`].
     no_returns: TimedPoints,
+    /// Up to where rays ran whose points are too far, see [`PointFilter::beyond_to`].
+    beyond: TimedPoints,
     /// Those of the robot itself, or too near: what lies behind them was not seen.
     of_robot: TimedPoints,
     /// How many points do not show the surroundings, and why.
@@ -77,6 +79,7 @@ impl FilteredPoints {
         Ok(Self {
             surroundings,
             no_returns: TimedPoints::of(all, |point| filter.passed_to(point)),
+            beyond: TimedPoints::of(all, |point| filter.beyond_to(point)),
             of_robot: TimedPoints::of(all, |point| filter.is_of_robot(point).then_some(point)),
             skipped,
             filter,
@@ -91,6 +94,11 @@ impl FilteredPoints {
     /// Up to where points tell that nothing was met.
     pub fn no_returns(&self) -> RayEnds<'_> {
         self.no_returns.as_ends()
+    }
+
+    /// Up to where rays ran that ended beyond the largest range.
+    pub fn beyond(&self) -> RayEnds<'_> {
+        self.beyond.as_ends()
     }
 
     /// Those of the robot itself, or too near.

@@ -27,6 +27,8 @@ pub struct Scan<'a> {
     pub times_s: Option<&'a [f32]>,
     /// Up to where nothing was met in other directions: they are seen through, and no voxels.
     pub no_returns: RayEnds<'a>,
+    /// Up to where rays ran that ended beyond the largest range: they are seen through, and no voxels.
+    pub beyond: RayEnds<'a>,
     /// Where rays ended at the robot itself: no voxels, and what lies behind them was not seen.
     pub of_robot: RayEnds<'a>,
     /// Points that were left out before, see [`FilteredPoints`](super::FilteredPoints).
@@ -63,7 +65,7 @@ impl<'a> Scan<'a> {
     /// How far the sensor moved with `velocity`, at most, between the scan's timestamp and a ray, meters.
     pub(super) fn moved_m(&self, velocity: Option<&Twist>) -> f64 {
         let points = RayEnds { points: self.points, times_s: self.times_s };
-        [points, self.no_returns, self.of_robot]
+        [points, self.no_returns, self.beyond, self.of_robot]
             .map(|ends| ends.moved_m(velocity))
             .into_iter()
             .fold(0.0, f64::max)
@@ -81,6 +83,7 @@ impl<'a> Scan<'a> {
             points,
             times_s: None,
             no_returns: RayEnds::default(),
+            beyond: RayEnds::default(),
             of_robot: RayEnds::default(),
             points_skipped: 0,
             gravity: None,

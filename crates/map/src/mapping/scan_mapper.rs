@@ -18,6 +18,7 @@ use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_
 use crate::geometry::{Point, Pose, Twist, pose_difference};
 use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 use crate::util::StopSignal;
+use crate::visibility::ScanRays;
 
 /// A scan that was found farther from its guess than this leaves a viewpoint, meters: the next ones come from there.
 const FAR_M: f64 = 1.0;
@@ -192,19 +193,30 @@ impl<'a> ScanMapper<'a> {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
-        let mut ends = self.met(scan, &record, velocity);
+        let mut points = self.met(scan, &record, velocity);
         if !scan.no_returns.points.is_empty() {
-            ends.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
+            points.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
         }
+        let beyond = scan.beyond.at(velocity);
         let (map_from_sensor, moved_m) = (&alignment.map_from_sensor, scan.moved_m(velocity));
         let from_guess_m = pose_difference(&located.guess, map_from_sensor).0;
         let is_needed = located.is_first || from_guess_m > FAR_M;
-        let seen = SeenScan { points: &ends, map_from_sensor, moved_m, is_needed };
+        let is_standing = self.is_standing(scan, map_from_sensor);
+        let (points, beyond) = (&points, &beyond);
+        let seen = SeenScan { points, beyond, map_from_sensor, moved_m, is_needed, is_standing };
         record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
         }
         Ok(record)
+    }
+
+    /// True of a scan that was taken where its robot's last one was that is in the map.
+    fn is_standing(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> bool {
+        let settings = self.settings.stationary.unwrap_or_default();
+        let trajectory = self.map.trajectory();
+        let last = trajectory.last_of(scan.robot);
+        last.is_some_and(|last| settings.is_same_pose(self.map, &last.map_from_sensor, map_from_sensor))
     }
 
     /// Where rays of a scan ended, the robot itself too, where the scan is as its record says.
@@ -239,17 +251,20 @@ impl<'a> ScanMapper<'a> {
         else {
             return Ok(Carving::default());
         };
-        let points = self.met(scan, record, located.velocity.as_ref());
-        let moved_m = scan.moved_m(located.velocity.as_ref());
-        CarvingScan { points: &points, record, moved_m }.carve(self.map, &settings, stop)
+        let velocity = located.velocity.as_ref();
+        let met = self.met(scan, record, velocity);
+        let (beyond, no_returns) = (scan.beyond.at(velocity), scan.no_returns.at(velocity));
+        let rays = ScanRays { met: &met, beyond: &beyond, no_returns: &no_returns };
+        CarvingScan { rays, record, moved_m: scan.moved_m(velocity) }.carve(self.map, &settings, stop)
     }
 
-    /// True of a scan that shows again what its robot's last one showed, from where that was taken, and carves nothing. That
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken, carves nothing, and sees nothing newly. That
     /// the robot was seen there is noted for its next guess.
     ///
     /// Never true of a scan that the caller wants at its guess, or in the map whatever it shows (`force`).
     pub fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
-        let is_kept = scan.at_guess || scan.force || !record.carved.is_empty();
+        let changes_what_is_free = !record.carved.is_empty() || record.viewpoint.is_some();
+        let is_kept = scan.at_guess || scan.force || changes_what_is_free;
         let Some(settings) = self.settings.stationary.filter(|_| !is_kept) else {
             return false;
         };

@@ -1,6 +1,6 @@
 //! Robots that stand still.
 
-use crate::geometry::pose_difference;
+use crate::geometry::{Pose, pose_difference};
 use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 
 /// When a scan counts as one of a robot that stands still with its view known already. Such a scan is accepted and not
@@ -30,9 +30,13 @@ impl StationarySettings {
         last: &MappedScan,
         record: &ScanRecord,
     ) -> bool {
-        let (meters, degrees) = pose_difference(&last.map_from_sensor, &record.pose.map_from_sensor);
-        meters <= self.distance * map.lattice().resolution_m(0)
-            && degrees <= self.rotation_deg
+        self.is_same_pose(map, &last.map_from_sensor, &record.pose.map_from_sensor)
             && map.view().absent(&record.voxels) as f64 <= self.new_voxels * record.voxels.len() as f64
+    }
+
+    /// True of two poses at which a robot stands still between them.
+    pub(super) fn is_same_pose(&self, map: &MultiResolutionMap, one: &Pose, other: &Pose) -> bool {
+        let (meters, degrees) = pose_difference(one, other);
+        meters <= self.distance * map.lattice().resolution_m(0) && degrees <= self.rotation_deg
     }
 }

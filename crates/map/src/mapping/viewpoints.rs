@@ -1,12 +1,16 @@
 //! Which scans leave a viewpoint (paper III-B: free space is generated from recorded poses), and which viewpoints make room.
 
+use std::borrow::Cow;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
 use crate::util::StopSignal;
-use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep, Viewpoint, ViewpointSet};
+use crate::visibility::{
+    IMAGE_BYTES_MAX, RangeImage, Sweep, Viewpoint, ViewpointSet, newly_seen_by_rays_m3, newly_seen_m3,
+};
 
 /// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
 pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 64 << 20;
@@ -26,9 +30,12 @@ pub struct ViewpointSettings {
     /// A scan from a new pose is new if this share of what it sees was unknown. 0.003: who passes between two viewpoints that saw
     /// all of it already leaves none.
     pub unknown_from_new_pose: f64,
-    /// A scan from a known pose is new if this share of what it sees was unknown. 0.05: a door that was opened, a robot with
-    /// another sensor, what the first rays missed.
+    /// A scan of a robot that drives by is new from a known pose if this share of what it sees was unknown. 0.05: it sees more from the
+    /// next new one.
     pub unknown_from_known_pose: f64,
+    /// A scan of a robot that stands is new from a known pose if it sees through so much of space that nobody saw through, cubic meters,
+    /// where space farther than 3 m away counts less, see [`newly_seen_m3`]. 0.15: a door was opened, somebody left, a pallet was fetched.
+    pub newly_seen_standing_m3: f64,
     /// What is further away is seen up to here, meters. 60.
     pub range_max_m: f32,
 }
@@ -41,6 +48,7 @@ impl Default for ViewpointSettings {
             rotation_deg: 15.0,
             unknown_from_new_pose: 0.003,
             unknown_from_known_pose: 0.05,
+            newly_seen_standing_m3: 0.15,
             range_max_m: 60.0,
         }
     }
@@ -51,6 +59,8 @@ const RAYS: usize = 300;
 /// Rays of an image that are looked along before it is kept. Of few rays chance lets some of a thousand scans see something new that a
 /// robot has seen in each of its rounds.
 const RAYS_OF_IMAGE: usize = 3000;
+/// What some rays tell to be newly seen may be so much less than what the image tells.
+const ROUGHLY: f64 = 0.5;
 /// Where along each: before its middle others saw most, and at its end it grazes what it meets.
 const ALONG: [f64; 3] = [0.5, 0.75, 0.9];
 /// Viewpoints that are compared when one has to go.
@@ -61,11 +71,15 @@ const COMPARED: usize = 24;
 pub(super) struct SeenScan<'a> {
     /// Where its rays ended, those at the robot itself and those that met nothing with them (sensor frame, finite).
     pub(super) points: &'a [Point],
+    /// Up to where others ran that ended farther away.
+    pub(super) beyond: &'a [Point],
     pub(super) map_from_sensor: &'a Pose,
     /// How far the sensor was from there, at most, when a ray was taken, meters.
     pub(super) moved_m: f64,
     /// It was found far from its guess, or is the map's first: the scans after it are judged by what it saw.
     pub(super) is_needed: bool,
+    /// Its robot's last one was taken there, too.
+    pub(super) is_standing: bool,
 }
 
 impl ViewpointSettings {
@@ -80,23 +94,28 @@ impl ViewpointSettings {
         if self.bytes_max == 0 {
             return None;
         }
-        let SeenScan { points, map_from_sensor, moved_m, is_needed } = scan;
-        let sweep = Sweep { range_max_m: self.range_max_m, moved_m: moved_m as f32 };
+        let SeenScan { points, beyond, map_from_sensor, moved_m, .. } = scan;
+        let ends: Cow<'_, [Point]> =
+            if beyond.is_empty() { points.into() } else { [points, beyond].concat().into() };
+        let range_m = |end: &Point| end.to_f64().coords.norm() as f32;
+        let open_m = beyond.iter().map(range_m).fold(f32::INFINITY, f32::min);
+        let sweep = Sweep { range_max_m: self.range_max_m, moved_m: moved_m as f32, open_m };
         let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
         let least = match is_known_pose {
-            true => self.unknown_from_known_pose,
-            false if is_needed => 0.0,
-            false => self.unknown_from_new_pose,
+            true if scan.is_standing => Least::Space(self.newly_seen_standing_m3),
+            true => Least::Share(self.unknown_from_known_pose),
+            false if scan.is_needed => Least::Share(0.0),
+            false => Least::Share(self.unknown_from_new_pose),
         };
         // The image takes a while to make: most scans end here.
-        if unknown_to(viewpoints, map_from_sensor, sweep, spread(points)) < least {
+        if !least.may_be_seen_by(&ends, sweep, map_from_sensor, viewpoints) {
             return None;
         }
-        let image = RangeImage::of_points(points, sweep, IMAGE_BYTES_MAX)?;
+        let image = RangeImage::of_points(&ends, sweep, IMAGE_BYTES_MAX)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown =
             share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.sees_through(point));
-        if unknown < least {
+        if !least.is_seen_by(&viewpoint, unknown, viewpoints) {
             return None;
         }
         let displaced = self.displaced_by(&viewpoint, unknown, viewpoints, stop)?;
@@ -152,6 +171,47 @@ impl ViewpointSettings {
         }
         displaced.sort_unstable();
         Some(displaced)
+    }
+}
+
+/// What a scan has to see newly so that it leaves a viewpoint.
+#[derive(Debug, Clone, Copy)]
+enum Least {
+    /// A share of the places along its rays.
+    Share(f64),
+    /// Space, cubic meters.
+    Space(f64),
+}
+
+impl Least {
+    /// False of most scans that see nothing newly, by some of their rays.
+    fn may_be_seen_by(
+        self,
+        ends: &[Point],
+        sweep: Sweep,
+        map_from_sensor: &Pose,
+        known: &ViewpointSet,
+    ) -> bool {
+        match self {
+            Self::Share(least) => unknown_to(known, map_from_sensor, sweep, spread(ends)) >= least,
+            Self::Space(least_m3) => {
+                let seen = ends.iter().filter_map(|end| sweep.limited(end.xyz()));
+                let mut gaze = known.gaze();
+                newly_seen_by_rays_m3(map_from_sensor, seen, |place| gaze.sees_through(place))
+                    >= ROUGHLY * least_m3
+            }
+        }
+    }
+
+    /// True of a viewpoint that is to be left; `unknown` is the share of what it sees that is not known.
+    fn is_seen_by(self, viewpoint: &Viewpoint, unknown: f64, known: &ViewpointSet) -> bool {
+        match self {
+            Self::Share(least) => unknown >= least,
+            Self::Space(least_m3) => {
+                let mut gaze = known.gaze();
+                newly_seen_m3(viewpoint, |place| gaze.sees_through(place)) >= least_m3
+            }
+        }
     }
 }
 
@@ -215,7 +275,7 @@ mod tests {
     }
 
     fn standing<'a>(points: &'a [Point], map_from_sensor: &'a Pose) -> SeenScan<'a> {
-        SeenScan { points, map_from_sensor, moved_m: 0.0, is_needed: false }
+        SeenScan { points, beyond: &[], map_from_sensor, moved_m: 0.0, is_needed: false, is_standing: false }
     }
 
     /// Drives through the room and back; the viewpoints, and how many there were after each scan.

@@ -21,6 +21,8 @@ pub struct PointFilter {
     pub body_m: Option<([f64; 3], [f64; 3])>,
     /// Points at exactly 0 0 0 count as any other. Otherwise they are skipped: most drivers write them where nothing returned.
     pub keep_zeros: bool,
+    /// Finite points beyond `range_max_m` say nothing. Otherwise they tell that their rays met nothing up to there.
+    pub beyond_range_is_noise: bool,
 }
 
 /// What it skips, by the names of its fields.
@@ -91,6 +93,7 @@ impl PointFilter {
             no_return_m: self.no_return_m.or(fallback.no_return_m),
             body_m: self.body_m.or(fallback.body_m),
             keep_zeros: self.keep_zeros || fallback.keep_zeros,
+            beyond_range_is_noise: self.beyond_range_is_noise || fallback.beyond_range_is_noise,
         }
     }
 
@@ -128,18 +131,34 @@ impl PointFilter {
 
     /// Up to where a point (sensor frame) that is skipped as too far tells that nothing was met: to `no_return_m` where nothing was met
     /// at all, and to itself where it is nearer than that. None of a point that is kept, and of one without a direction; none at all
-    /// where nobody says from where on nothing was met, since a driver may say that by any distance.
+    /// where nobody says from where on nothing was met: see [`PointFilter::beyond_to`].
     pub fn passed_to(&self, point: Point) -> Option<Point> {
         let no_return_m = self.no_return_m.filter(|_| self.is_return(point))?;
-        let itself = point;
-        let point = point.to_f64().coords;
-        let range_m = point.norm();
-        if !self.is_no_return(itself) {
-            return self.range_max_m.filter(|max| range_m > *max).map(|_| itself);
+        if self.is_no_return(point) {
+            return Some(cut_to(point, no_return_m));
         }
-        let to: [f64; 3] = (point * (no_return_m / range_m)).into();
-        Some(Point::from(to.map(|c| c as f32)))
+        self.is_beyond(point).then_some(point)
     }
+
+    /// Where nobody says from where on nothing was met, up to where the ray of a point (sensor frame) beyond `range_max_m` met nothing:
+    /// to `range_max_m`, since a driver may write any distance for "nothing returned". None of all other points.
+    pub fn beyond_to(&self, point: Point) -> Option<Point> {
+        let max_m = self.range_max_m.filter(|_| self.no_return_m.is_none() && self.is_return(point))?;
+        self.is_beyond(point).then(|| cut_to(point, max_m))
+    }
+
+    /// True of a point beyond `range_max_m`, where that is no noise.
+    fn is_beyond(&self, point: Point) -> bool {
+        let range_m = point.to_f64().coords.norm();
+        !self.beyond_range_is_noise && self.range_max_m.is_some_and(|max_m| range_m > max_m)
+    }
+}
+
+/// The point of the ray to `point` that is so far from the sensor.
+fn cut_to(point: Point, range_m: f64) -> Point {
+    let point = point.to_f64().coords;
+    let to: [f64; 3] = (point * (range_m / point.norm())).into();
+    Point::from(to.map(|c| c as f32))
 }
 
 #[cfg(test)]
@@ -163,7 +182,7 @@ mod tests {
             range_max_m: Some(10.0),
             no_return_m: None,
             body_m: Some(([-1.0, -0.4, -0.8], [0.2, 0.4, 0.0])),
-            keep_zeros: false,
+            ..PointFilter::default()
         };
         let keeps = |x, y, z| filter.keeps(Point::new(x, y, z));
         assert!(keeps(1.0, 0.0, 0.0) && keeps(0.0, 10.0, 0.0));
@@ -200,11 +219,26 @@ mod tests {
         assert_eq!(filter.passed_to(Point::new(f32::INFINITY, 0.0, 0.0)), None);
         let near = PointFilter { range_max_m: Some(20.0), ..filter };
         assert!(!near.keeps(met) && near.passed_to(met) == Some(met), "it was met, and makes no voxel");
+        assert_eq!((near.beyond_to(met), near.beyond_to(far)), (None, None));
         assert_eq!(near.passed_to(Point::new(0.0, 19.0, 0.0)), None);
+        let noise = PointFilter { beyond_range_is_noise: true, ..near };
+        assert_eq!((noise.passed_to(met), noise.passed_to(far)), (None, near.passed_to(far)));
         assert_eq!(near.passed_to(far), filter.passed_to(far));
-        let unknown = PointFilter { range_max_m: Some(20.0), ..PointFilter::default() };
-        assert_eq!(unknown.passed_to(met), None);
-        assert_eq!(PointFilter::default().passed_to(far), None);
+        let none = PointFilter::default();
+        assert_eq!((none.passed_to(far), none.beyond_to(far)), (None, None));
+    }
+
+    #[test]
+    fn a_finite_point_beyond_the_range_proves_its_ray_up_to_there_unless_it_is_noise() {
+        let filter = PointFilter { range_max_m: Some(20.0), ..PointFilter::default() };
+        assert_eq!(filter.beyond_to(Point::new(0.0, 0.0, 29.9)), Some(Point::new(0.0, 0.0, 20.0)));
+        assert_eq!(filter.beyond_to(Point::new(0.0, -6e37, 8e37)), Some(Point::new(0.0, -12.0, 16.0)));
+        for nothing in [[0.0, 20.0, 0.0], [0.0; 3], [f32::INFINITY, 0.0, 0.0], [f32::NAN, 30.0, 0.0]] {
+            assert_eq!(filter.beyond_to(nothing.into()), None, "{nothing:?}");
+        }
+        let noise = PointFilter { beyond_range_is_noise: true, ..filter };
+        assert_eq!(noise.beyond_to(Point::new(0.0, 0.0, 29.9)), None);
+        assert_eq!(filter.or(PointFilter { range_max_m: None, ..noise }), noise, "a robot's setting holds");
     }
 
     #[test]

@@ -7,11 +7,13 @@
 mod cube_map;
 mod density;
 mod nearest_depths;
+mod newly_seen;
 mod range_image;
 mod ray_gaps;
 mod ray_index;
 mod reach;
 mod scan_image;
+mod scan_rays;
 mod scan_surface;
 mod set;
 mod sight;
@@ -21,8 +23,11 @@ mod tile;
 mod vectors;
 mod viewpoint;
 
+pub use newly_seen::{newly_seen_by_rays_m3, newly_seen_m3};
 pub use range_image::{IMAGE_BYTES_MAX, Met, RangeImage, RangeImageError, Sweep, WellBeyond};
+pub use ray_index::RayWindow;
 pub use scan_image::ScanImage;
+pub use scan_rays::ScanRays;
 pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
 pub use sight::Sight;

@@ -11,12 +11,19 @@ use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
-/// Tiles along the side of a face, finest first: pixels of 0.6 to 7 degrees.
+/// Tiles along the side of a face, finest first, fewer than [`TELLS_OPEN`]: pixels of 0.6 to 7 degrees.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
 /// Bytes of an image before its tiles: how many there are along a side, the unit of depths, and how the rays lay.
 const HEAD_BYTES: usize = 1 + 3 * 4;
 /// Says in an image's first byte that its head tells how the rays lay. The first images did not.
 const TELLS_RAYS: u8 = 0x80;
+/// Says in an image's first byte that a number is behind its head: from where on nothing was met.
+const TELLS_OPEN: u8 = 0x40;
+/// Bytes of that number.
+const OPEN_BYTES: usize = 4;
+/// How much nearer than where nothing was met a pixel may tell it, as a share: its depth is the least of rays that ran up to 2.9 degrees
+/// away, and of a place in it.
+const OPEN_SLACK: f32 = 0.035;
 /// Bytes of what their heads did not tell.
 const RAYS_BYTES: usize = 2 * 4;
 /// Depths in the image's unit are at most this.
@@ -42,6 +49,8 @@ pub struct RangeImage {
     /// Meters of one unit of depth.
     unit_m: f32,
     rays: Rays,
+    /// [`Sweep::open_m`].
+    open_m: f32,
     /// For each tile of the cube its number among those that are kept.
     places: Vec<u16>,
     tiles: Vec<Tile>,
@@ -66,6 +75,8 @@ pub struct Sweep {
     pub range_max_m: f32,
     /// How far the sensor was, at most, from the scan's pose when it took a ray, meters; 0 of one that stood.
     pub moved_m: f32,
+    /// Rays that end here or farther away met nothing: they run on, meters. Infinite: each met something.
+    pub open_m: f32,
 }
 
 /// How the rays of an image lay.
@@ -106,6 +117,9 @@ pub enum RangeImageError {
     /// What it tells of its rays cannot be.
     #[error("a range image whose sensor moved by {0} m, its rays {1} apart: neither may be negative")]
     Rays(f32, f32),
+    /// What it tells of rays that ran on cannot be.
+    #[error("a range image whose rays ran on beyond {0} m, a number from 0 expected")]
+    Open(f32),
 }
 
 impl RangeImage {
@@ -120,11 +134,11 @@ impl RangeImage {
         let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
         let mut fitting =
             depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map(), bytes_max));
-        let first = Self::of_depths(&fitting.next()?, rays);
+        let of_depths = |depths: &NearestDepths| Self::of_depths(depths, rays, sweep.open_m);
+        let first = of_depths(&fitting.next()?);
         // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
         let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
-        let mut best =
-            coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
+        let mut best = coarser.map(|depths| of_depths(&depths)).fold(first, Self::that_tells_more);
         best.note_gaps(&RayGaps { map: map.finer(), spacing, offsets: &offsets });
         (!best.tiles.is_empty()).then_some(best)
     }
@@ -152,7 +166,7 @@ impl RangeImage {
         seen as f32 * self.map.pitch() * self.map.pitch()
     }
 
-    fn of_depths(depths: &NearestDepths, rays: Rays) -> Self {
+    fn of_depths(depths: &NearestDepths, rays: Rays, open_m: f32) -> Self {
         let map = depths.map();
         let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
         let (mut places, mut tiles) = (vec![NOT_SEEN; map.tiles_of_all_faces()], Vec::new());
@@ -163,7 +177,7 @@ impl RangeImage {
                 tiles.push(Tile::new(&depths));
             }
         }
-        Self { map, unit_m, rays, places, tiles }
+        Self { map, unit_m, rays, open_m, places, tiles }
     }
 
     /// True where the scan saw beyond the point at `offset` from the sensor, in its frame: the point was not hidden, and nothing
@@ -191,9 +205,7 @@ impl RangeImage {
     fn gap_at(&self, pixel: Pixel) -> f32 {
         let around = [[-1, -1], [1, -1], [-1, 1], [1, 1]].into_iter();
         let pixels = around.filter_map(|steps| self.map.beside(pixel, steps));
-        let tiles = pixels.filter_map(|(face, pixel)| {
-            self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))
-        });
+        let tiles = pixels.filter_map(|pixel| self.tile_at(pixel));
         tiles.map(Tile::gap).fold(self.rays.spacing, f32::max)
     }
 
@@ -227,15 +239,34 @@ impl RangeImage {
 
     /// How deep a pixel was seen, meters; none where it was not.
     #[inline(always)]
-    fn depth_m(&self, face: usize, pixel: [usize; 2]) -> Option<f32> {
+    pub(super) fn depth_m(&self, face: usize, pixel: [usize; 2]) -> Option<f32> {
         let (tile, pixel) = self.map.place(face, pixel);
         let tile = self.tiles.get(usize::from(self.places[tile]))?;
         tile.depth(pixel).map(|depth| depth as f32 * self.unit_m)
     }
 
-    /// What the scan tells of the point at `offset` from the sensor, in its frame, meters.
+    /// How deep a pixel was seen, meters; none where it was not, and where the rays in it ran on.
+    #[inline(always)]
+    fn met_depth_m(&self, (face, pixel): Pixel) -> Option<f32> {
+        let depth_m = self.depth_m(face, pixel)?;
+        (self.open_m.is_infinite() || !self.is_open((face, pixel), depth_m)).then_some(depth_m)
+    }
+
+    /// True where the rays in a pixel that was seen so deep may have run on.
+    fn is_open(&self, (face, pixel): Pixel, depth_m: f32) -> bool {
+        let step_m = self.tile_at((face, pixel)).map_or(0.0, |tile| f32::from(tile.step()) * self.unit_m);
+        let told_m = (depth_m + step_m) * norm(self.map.direction(face, pixel));
+        told_m >= self.open_m * (1.0 - OPEN_SLACK - 0.5 * self.map.pitch())
+    }
+
+    /// What the scan tells of the point at `offset` from the sensor, in its frame, meters, by what it met.
     pub fn sight(&self, offset: [f32; 3], tolerance_m: f32) -> Sight {
-        sight(self.map, |(face, pixel)| self.depth_m(face, pixel), offset, tolerance_m + self.rays.moved_m)
+        sight(self.map, |pixel| self.met_depth_m(pixel), offset, tolerance_m + self.rays.moved_m)
+    }
+
+    /// The tile of a pixel, where it is kept.
+    fn tile_at(&self, (face, pixel): Pixel) -> Option<&Tile> {
+        self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))
     }
 
     /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw, and none of which is off by more than
@@ -251,7 +282,7 @@ impl RangeImage {
     }
 
     /// The pixels of the tiles that are kept, seen or not.
-    fn kept_pixels(&self) -> impl Iterator<Item = Pixel> {
+    pub(super) fn kept_pixels(&self) -> impl Iterator<Item = Pixel> {
         let kept = self.places.iter().enumerate().filter(|(_, place)| **place != NOT_SEEN);
         kept.flat_map(|(tile, _)| self.map.pixels_of_tile(tile))
     }
@@ -259,13 +290,13 @@ impl RangeImage {
     /// What was met in a pixel. Its depth is that of the nearest point in it: how far off that is from the middle of the pixel is told
     /// by the pixels around it.
     fn met_at(&self, (face, pixel): Pixel) -> Option<Met> {
-        let depth_m = self.depth_m(face, pixel)?;
+        let depth_m = self.met_depth_m((face, pixel))?;
         let beside = [[-1, 0], [1, 0], [0, -1], [0, 1]].into_iter();
         let on_face =
             beside.filter_map(|steps| self.map.beside((face, pixel), steps)).filter(|at| at.0 == face);
         let changes =
             on_face.filter_map(|(face, pixel)| self.depth_m(face, pixel)).map(|m| (m - depth_m).abs());
-        let tile = self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))?;
+        let tile = self.tile_at((face, pixel))?;
         Some(Met {
             offset: self.map.direction(face, pixel).map(|c| c * depth_m),
             error_m: changes.fold(f32::from(tile.step()) * self.unit_m, f32::max) + self.rays.moved_m,
@@ -280,6 +311,11 @@ impl RangeImage {
         })
     }
 
+    /// Its pixels.
+    pub(super) fn map(&self) -> CubeMap {
+        self.map
+    }
+
     /// The side of a pixel at depth 1.
     pub fn pitch(&self) -> f32 {
         self.map.pitch()
@@ -287,7 +323,12 @@ impl RangeImage {
 
     /// Bytes of the image where it is stored.
     pub fn stored_bytes(&self) -> usize {
-        stored_bytes(self.map, self.tiles.len())
+        stored_bytes(self.map, self.tiles.len()) + if self.tells_open() { OPEN_BYTES } else { 0 }
+    }
+
+    /// True where some of its rays ran on.
+    fn tells_open(&self) -> bool {
+        self.open_m.is_finite()
     }
 
     /// Bytes of memory.
@@ -295,13 +336,16 @@ impl RangeImage {
         self.places.len() * size_of::<u16>() + self.tiles.len() * size_of::<Tile>()
     }
 
-    /// The image as bytes: how many tiles there are along a side and 128 (1 byte), the unit of depths (f32), how far the sensor moved in
-    /// meters (f32) and how far apart the rays lay at depth 1 (f32), a bit for each tile of the six faces that says whether it is
+    /// The image as bytes: how many tiles there are along a side and 128 (1 byte; and 64 where rays ran on), the unit of depths (f32), how
+    /// far the sensor moved in meters (f32) and how far apart the rays lay at depth 1 (f32), from where on nothing was met in meters
+    /// (f32; where rays ran on), a bit for each tile of the six faces that says whether it is
     /// kept, and the tiles that are. All little-endian. The first images, without the 128, told nothing of their rays.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.stored_bytes());
-        bytes.push(self.map.tiles() as u8 | TELLS_RAYS);
-        for number in [self.unit_m, self.rays.moved_m, self.rays.spacing] {
+        let tells_open = if self.tells_open() { TELLS_OPEN } else { 0 };
+        bytes.push(self.map.tiles() as u8 | TELLS_RAYS | tells_open);
+        let open_m = self.tells_open().then_some(self.open_m);
+        for number in [self.unit_m, self.rays.moved_m, self.rays.spacing].into_iter().chain(open_m) {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
         bytes.extend(self.places.chunks(8).map(|places| {
@@ -321,9 +365,14 @@ impl RangeImage {
         let (&first, rest) = bytes.split_first().ok_or_else(|| short.clone())?;
         let (unit_m, rest) = number_from(rest).ok_or_else(|| short.clone())?;
         let tells_rays = first & TELLS_RAYS != 0;
-        let (rays, rest) =
-            if tells_rays { Rays::from_bytes(rest).ok_or(short)? } else { (Rays::NOT_TOLD, rest) };
-        let tiles = usize::from(first & !TELLS_RAYS);
+        let (rays, rest) = if tells_rays {
+            Rays::from_bytes(rest).ok_or_else(|| short.clone())?
+        } else {
+            (Rays::NOT_TOLD, rest)
+        };
+        let tells_open = tells_rays && first & TELLS_OPEN != 0;
+        let (open_m, rest) = if tells_open { number_from(rest).ok_or(short)? } else { (f32::INFINITY, rest) };
+        let tiles = usize::from(first & !(if tells_rays { TELLS_RAYS | TELLS_OPEN } else { TELLS_RAYS }));
         if tiles == 0 {
             return Err(RangeImageError::Tiles(tiles));
         }
@@ -334,12 +383,16 @@ impl RangeImage {
         if !(moved_m >= 0.0 && moved_m.is_finite() && spacing >= 0.0 && spacing.is_finite()) {
             return Err(RangeImageError::Rays(moved_m, spacing));
         }
+        if tells_open && !(open_m >= 0.0 && open_m.is_finite()) {
+            return Err(RangeImageError::Open(open_m));
+        }
         let map = CubeMap::new(tiles);
         let count = map.tiles_of_all_faces();
         let bits = &rest[..count.div_ceil(8).min(rest.len())];
         let is_kept = |tile: usize| bits.get(tile / 8).is_some_and(|byte| byte >> (tile % 8) & 1 == 1);
         let kept = (0..count).filter(|&tile| is_kept(tile)).count();
-        let expected = stored_bytes(map, kept) - if tells_rays { 0 } else { RAYS_BYTES };
+        let open = if tells_open { OPEN_BYTES } else { 0 };
+        let expected = stored_bytes(map, kept) + open - if tells_rays { 0 } else { RAYS_BYTES };
         if bytes.len() != expected {
             return Err(RangeImageError::Length { got: bytes.len(), expected });
         }
@@ -348,7 +401,7 @@ impl RangeImage {
             places[tile] = place as u16;
         }
         let (tiles, _) = rest[bits.len()..].as_chunks::<TILE_BYTES>();
-        Ok(Self { map, unit_m, rays, places, tiles: tiles.iter().map(Tile::read).collect() })
+        Ok(Self { map, unit_m, rays, open_m, places, tiles: tiles.iter().map(Tile::read).collect() })
     }
 }
 
@@ -362,7 +415,7 @@ impl std::fmt::Debug for RangeImage {
 impl Sweep {
     /// The sweep of a sensor that stood.
     pub const fn standing(range_max_m: f32) -> Self {
-        Self { range_max_m, moved_m: 0.0 }
+        Self { range_max_m, moved_m: 0.0, open_m: f32::INFINITY }
     }
 
     /// The point at `offset` from the sensor, as far as it is seen; none of what has no direction.

@@ -47,6 +47,19 @@ pub(super) struct Ball {
     pub(super) radius_m: f32,
 }
 
+/// A rectangle around a place, across its direction from the sensor, through which rays may have run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayWindow {
+    /// The place, from the sensor, in its frame, meters.
+    pub offset: [f32; 3],
+    /// Rays count that ended so far beyond it, meters.
+    pub radius_m: f32,
+    /// Axes of the rectangle, at right angles to the direction and to each other, of length 1.
+    pub across: [[f32; 3]; 2],
+    /// Half of its sides along them, meters.
+    pub half_m: [f32; 2],
+}
+
 impl RayIndex {
     /// The index of rays that ended at `offsets` from the sensor.
     pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
@@ -91,6 +104,37 @@ impl RayIndex {
         places.filter(|&place| !self.runs_near(place, &view)).nth(PLACES_MISSED_MAX).is_none()
     }
 
+    /// How far from each other rays ran at most along the first axis of a window, wherever along the second, meters; no more than
+    /// twice the window is told. What is as long as the window and thicker than that was met by one.
+    pub(super) fn widest_gap_m(&self, window: RayWindow) -> f32 {
+        let RayWindow { offset, radius_m, across, half_m: [half_m, long_m] } = window;
+        let view = View { ball: Ball { offset, radius_m }, distance_m: norm(offset), across, near_m: 0.0 };
+        let (wide_m, step_m) = (2.0 * half_m, 0.5 * view.distance_m * self.map.pitch());
+        let along = |most_m: f32| {
+            let steps = (most_m / step_m).ceil() as i32;
+            (-steps..=steps).map(move |i| i as f32 * step_m)
+        };
+        let places = along(wide_m).flat_map(|a| along(long_m).map(move |b| [a, b]));
+        let mut pixels: Vec<usize> = places
+            .filter_map(|place| Some(pixel_number(self.map, self.map.project(view.point(place))?)))
+            .collect();
+        pixels.sort_unstable();
+        pixels.dedup();
+        let ends = pixels
+            .into_iter()
+            .flat_map(|pixel| &self.ends[self.begins[pixel] as usize..self.begins[pixel + 1] as usize]);
+        let ran = ends.filter_map(|&end| view.place_of(end));
+        let mut ran: Vec<f32> =
+            ran.filter(|[a, b]| a.abs() <= wide_m && b.abs() <= long_m).map(|[a, _]| a).collect();
+        ran.push(wide_m);
+        ran.sort_unstable_by(f32::total_cmp);
+        let mut before_m = -wide_m;
+        ran.into_iter().fold(0.0, |widest_m: f32, a| {
+            let from_m = std::mem::replace(&mut before_m, a);
+            if a <= -half_m || from_m >= half_m { widest_m } else { widest_m.max(a - from_m) }
+        })
+    }
+
     /// True where a ray that ended beyond the ball ran near to a place of its disc.
     fn runs_near(&self, place: [f32; 2], view: &View) -> bool {
         // The nearest rays are mostly in the pixel of the place, or else in those around it.
@@ -122,13 +166,22 @@ impl View {
         std::array::from_fn(|axis| self.ball.offset[axis] + right[axis] * a + up[axis] * b)
     }
 
-    /// True where the ray with this end ran near to a place of that plane, and ended beyond the ball.
-    fn runs_near(&self, end: [f32; 3], place: [f32; 2]) -> bool {
+    /// Where the ray with this end ran through that plane, if it ended beyond the ball.
+    #[inline(always)]
+    fn place_of(&self, end: [f32; 3]) -> Option<[f32; 2]> {
         let along = dot(end, self.ball.offset) / self.distance_m;
         let beyond_m = self.distance_m + self.ball.radius_m;
         let scale = self.distance_m / along;
-        let [a, b] = [0, 1].map(|axis| dot(end, self.across[axis]) * scale - place[axis]);
-        along > 0.0 && dot(end, end) > beyond_m * beyond_m && a * a + b * b <= self.near_m * self.near_m
+        (along > 0.0 && dot(end, end) > beyond_m * beyond_m)
+            .then(|| [0, 1].map(|axis| dot(end, self.across[axis]) * scale))
+    }
+
+    /// True where the ray with this end ran near to a place of that plane, and ended beyond the ball.
+    fn runs_near(&self, end: [f32; 3], place: [f32; 2]) -> bool {
+        self.place_of(end).is_some_and(|ran| {
+            let [a, b] = [0, 1].map(|axis| ran[axis] - place[axis]);
+            a * a + b * b <= self.near_m * self.near_m
+        })
     }
 }
 

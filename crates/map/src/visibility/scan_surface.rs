@@ -2,9 +2,9 @@
 
 use super::cube_map::{CubeMap, FACES, Pixel, Projection};
 use super::density::PointDensity;
-use super::ray_index::{Ball, RayIndex};
+use super::ray_index::{Ball, RayIndex, RayWindow};
+use super::scan_rays::ScanRays;
 use super::vectors::{across, between, distance, norm};
-use crate::geometry::Point;
 
 /// Points that are farther apart than so many samples say nothing of what is between them.
 const SAMPLES_MAX: f32 = 32.0;
@@ -13,6 +13,8 @@ const NEAREST: f32 = 4.0;
 /// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both meet, and
 /// for where pixels are smallest, at the corners of the cube.
 const FILLINGS: usize = 3;
+/// A ray without a return is believed as far as all that was met in so many pixels on each side of its own.
+const AGREE: isize = 2;
 /// Number of a pixel in which nothing was seen.
 const NOT_SEEN: u32 = u32::MAX;
 
@@ -40,7 +42,7 @@ pub struct ScanSurface {
     /// For each pixel, face by face and row by row, the number of its hit.
     places: Vec<u32>,
     hits: Vec<Hit>,
-    /// All of the scan's rays.
+    /// All of the scan's rays, as far as they are believed.
     rays: RayIndex,
 }
 
@@ -54,35 +56,58 @@ struct Hit {
     is_rim: bool,
     /// Between two others, and no point of the scan.
     is_filled: bool,
+    /// The ray ran on: there is no surface.
+    is_open: bool,
+}
+
+impl Hit {
+    fn at(offset: [f32; 3]) -> Self {
+        Self { offset, distance_m: norm(offset), is_rim: false, is_filled: false, is_open: false }
+    }
 }
 
 impl ScanSurface {
-    /// The surface of a scan of `points` (sensor frame, finite); none of a scan without points.
-    pub fn of(points: &[Point], settings: SurfaceSettings) -> Option<Self> {
-        let offsets: Vec<_> = points.iter().map(|point| point.xyz()).collect();
+    /// The surface of a scan with these rays; none of a scan without any.
+    pub fn of(rays: ScanRays<'_>, settings: SurfaceSettings) -> Option<Self> {
+        let mut offsets: Vec<_> = rays.all().map(|point| point.xyz()).collect();
         let PointDensity { map, .. } = PointDensity::of(&offsets)?;
-        let mut surface = Self::of_points(&offsets, map, settings);
+        let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
+        let index = RayIndex::of(map, &[]);
+        let mut surface = Self { map, settings, places, hits: Vec::new(), rays: index };
+        let (returned, no_returns) = offsets.split_at_mut(rays.met.len() + rays.beyond.len());
+        surface.see_nearest(&returned[..rays.met.len()], false);
+        surface.see_nearest(&returned[rays.met.len()..], true);
+        // All of them are cut before one is seen: they do not vouch for each other's ends.
+        no_returns.iter_mut().for_each(|end| *end = surface.cut_to_what_agrees(*end));
+        surface.see_nearest(no_returns, true);
+        surface.rays = RayIndex::of(map, &offsets);
         (0..FILLINGS).for_each(|_| surface.fill());
         surface.find_rims();
         Some(surface)
     }
 
-    /// The nearest point in each pixel.
-    fn of_points(offsets: &[[f32; 3]], map: CubeMap, settings: SurfaceSettings) -> Self {
-        let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
-        let rays = RayIndex::of(map, offsets);
-        let mut surface = Self { map, settings, places, hits: Vec::new(), rays };
+    /// Sees the nearest in each pixel.
+    fn see_nearest(&mut self, offsets: &[[f32; 3]], is_open: bool) {
         for &offset in offsets {
-            let Some(Projection { face, pixel, .. }) = map.project(offset) else { continue };
-            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: false };
-            let place = surface.place((face, pixel));
-            match surface.hits.get_mut(surface.places[place] as usize) {
+            let Some(Projection { face, pixel, .. }) = self.map.project(offset) else { continue };
+            let hit = Hit { is_open, ..Hit::at(offset) };
+            let place = self.place((face, pixel));
+            match self.hits.get_mut(self.places[place] as usize) {
                 Some(nearest) if nearest.distance_m <= hit.distance_m => {}
                 Some(nearest) => *nearest = hit,
-                None => surface.put(place, hit),
+                None => self.put(place, hit),
             }
         }
-        surface
+    }
+
+    /// The end of a ray without a return, no farther away than what other rays met around it.
+    fn cut_to_what_agrees(&self, end: [f32; 3]) -> [f32; 3] {
+        let Some(Projection { face, pixel, .. }) = self.map.project(end) else { return end };
+        let around = (-AGREE..=AGREE).flat_map(|up| (-AGREE..=AGREE).map(move |right| [right, up]));
+        let hits = around.filter_map(|steps| self.hit(self.map.beside((face, pixel), steps)?));
+        let nearest_m = hits.map(|hit| hit.distance_m).fold(f32::INFINITY, f32::min);
+        let share = (nearest_m / norm(end)).min(1.0);
+        end.map(|c| c * share)
     }
 
     fn put(&mut self, place: usize, hit: Hit) {
@@ -94,20 +119,20 @@ impl ScanSurface {
     fn fill(&mut self) {
         let between = |a: Option<&Hit>, b: Option<&Hit>| {
             let (a, b) = (a?, b?);
-            self.are_joined(a, b).then(|| std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0))
+            let halfway = std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0);
+            let filled = Hit { is_filled: true, is_open: a.is_open || b.is_open, ..Hit::at(halfway) };
+            self.are_joined(a, b).then_some(filled)
         };
         let halfway = |pixel: Pixel| {
             let at = |steps| self.hit(self.map.beside(pixel, steps)?);
             let beside = between(at([-1, 0]), at([1, 0]));
             let above = between(at([0, -1]), at([0, 1]));
-            beside.into_iter().chain(above).min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
+            beside.into_iter().chain(above).min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
         };
         let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
-        let filled: Vec<(usize, [f32; 3])> =
+        let filled: Vec<(usize, Hit)> =
             unseen.filter_map(|pixel| Some((self.place(pixel), halfway(pixel)?))).collect();
-        for (place, offset) in filled {
-            self.put(place, Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: true });
-        }
+        filled.into_iter().for_each(|(place, hit)| self.put(place, hit));
     }
 
     fn find_rims(&mut self) {
@@ -152,13 +177,14 @@ impl ScanSurface {
     /// farther apart than the settings say, but for the points of the scan itself.
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
         for pixel in self.map.all_pixels() {
-            let Some(hit) = self.hit(pixel).filter(|hit| hit.distance_m <= range_m) else { continue };
+            let is_surface = |hit: &&Hit| !hit.is_open && hit.distance_m <= range_m;
+            let Some(hit) = self.hit(pixel).filter(is_surface) else { continue };
             if hit.is_filled {
                 f(hit.offset);
             }
             let beside = |steps| {
                 let beside = self.map.beside(pixel, steps).and_then(|pixel| self.hit(pixel))?;
-                self.are_joined(hit, beside).then_some(beside)
+                (!beside.is_open && self.are_joined(hit, beside)).then_some(beside)
             };
             let (right, up) = (beside([1, 0]), beside([0, 1]));
             let across = beside([1, 1]).zip(right).zip(up).filter(|((across, right), up)| {
@@ -235,6 +261,11 @@ impl ScanSurface {
         ends_beyond && self.rays.pass(Ball { offset, radius_m }, gap_max_m / 2.0)
     }
 
+    /// The widest gap between rays across a window, see [`RayWindow`], meters.
+    pub fn widest_gap_m(&self, window: RayWindow) -> f32 {
+        self.rays.widest_gap_m(window)
+    }
+
     #[inline(always)]
     fn place(&self, (face, [column, row]): Pixel) -> usize {
         let side = self.map.pixels();
@@ -249,3 +280,59 @@ impl ScanSurface {
 
 /// The pixels around one.
 const AROUND: [[isize; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point;
+
+    const SETTINGS: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0.1, spacing_m: 0.2 };
+
+    /// Rays half a degree apart about the x axis that end so far away as `end_m` says of their angles to the side and up, degrees; with
+    /// those that it says nothing of.
+    fn rays(end_m: impl Fn(f32, f32) -> Option<f32>) -> [Vec<Point>; 2] {
+        let mut rays = [Vec::new(), Vec::new()];
+        for i in 0..120 * 80 {
+            let (side, up) = ((i % 120) as f32 * 0.5 - 30.0, (i / 120) as f32 * 0.5 - 20.0);
+            let direction = [1.0, side.to_radians().tan(), up.to_radians().tan()];
+            let end_m = end_m(side, up);
+            let range_m = end_m.unwrap_or(50.0);
+            rays[usize::from(end_m.is_none())].push(direction.map(|c| c * range_m / norm(direction)).into());
+        }
+        rays
+    }
+
+    fn sees_through(rays: &ScanRays<'_>, [x, side, up]: [f32; 3]) -> bool {
+        let surface = ScanSurface::of(*rays, SETTINGS).unwrap();
+        let at = [x, x * side.to_radians().tan(), x * up.to_radians().tan()];
+        surface.sees_through(at, 0.087, 0.15)
+    }
+
+    #[test]
+    fn rays_without_a_return_are_believed_where_those_beside_them_agree() {
+        // Sky above, and ground below that is met far away.
+        let [met, no_returns] = rays(|_, up| (up < 0.0).then_some(20.0));
+        let open = ScanRays { no_returns: &no_returns, ..ScanRays::met(&met) };
+        assert!(sees_through(&open, [5.0, 3.0, 8.0]) && sees_through(&open, [5.0, 3.0, 0.3]));
+        assert!(!sees_through(&ScanRays::met(&met), [5.0, 3.0, 8.0]), "nobody tells of the sky");
+        // A wall 4 m away, of which a few rays beside each other do not return.
+        let [met, no_returns] = rays(|side, up| (side.abs() > 0.6 || up.abs() > 0.6).then_some(4.0));
+        assert!(!no_returns.is_empty());
+        let wall = ScanRays { no_returns: &no_returns, ..ScanRays::met(&met) };
+        assert!(!sees_through(&wall, [5.0, 0.0, 0.0]), "behind a hole in a wall");
+        let [met, no_returns] = rays(|side, _| (side.abs() > 2.0).then_some(4.0));
+        let gap = ScanRays { no_returns: &no_returns, ..ScanRays::met(&met) };
+        assert!(!sees_through(&gap, [5.0, 0.0, 0.0]), "in a narrow gap");
+    }
+
+    #[test]
+    fn rays_that_ran_on_are_seen_through_and_are_no_surface() {
+        let beyond: Vec<Point> = rays(|_, _| Some(8.0))[0].clone();
+        let rays = ScanRays { beyond: &beyond, ..ScanRays::default() };
+        assert!(sees_through(&rays, [7.0, 3.0, 8.0]) && !sees_through(&rays, [8.1, 3.0, 8.0]));
+        let (mut open, mut met) = (0, 0);
+        ScanSurface::of(rays, SETTINGS).unwrap().for_samples(20.0, |_| open += 1);
+        ScanSurface::of(ScanRays::met(&beyond), SETTINGS).unwrap().for_samples(20.0, |_| met += 1);
+        assert!(open == 0 && met > 100, "{open}, {met}");
+    }
+}

@@ -99,7 +99,7 @@ const SURFACE: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0
 #[test]
 fn a_ball_is_seen_through_only_where_all_of_it_is() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
-    let surface = ScanSurface::of(&half_hidden(&mut random), SURFACE).unwrap();
+    let surface = ScanSurface::of(ScanRays::met(&half_hidden(&mut random)), SURFACE).unwrap();
     let sees_through = |offset| surface.sees_through(offset, 0.05, 0.1);
     assert!(sees_through([2.0, -0.5, 0.1]) && surface.sees_beyond([2.0, -0.5, 0.1], 0.05));
     assert!(
@@ -118,7 +118,8 @@ fn samples_leave_no_gap_wider_than_their_spacing_and_join_no_rims() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     // Points farther apart than samples, which only a surface at a sharper angle than half a radian would join to the plate.
     let points: Vec<_> = half_hidden(&mut random).into_iter().step_by(40).collect();
-    let surface = ScanSurface::of(&points, SurfaceSettings { grazing_rad: 0.5, ..SURFACE }).unwrap();
+    let surface =
+        ScanSurface::of(ScanRays::met(&points), SurfaceSettings { grazing_rad: 0.5, ..SURFACE }).unwrap();
     let mut samples: Vec<[f32; 3]> = points.iter().map(|point| point.xyz()).collect();
     surface.for_samples(10.0, |sample| samples.push(sample));
     for &[x, _, _] in &samples {
@@ -138,8 +139,8 @@ fn samples_leave_no_gap_wider_than_their_spacing_and_join_no_rims() {
 
 #[test]
 fn a_scan_without_points_has_no_surface() {
-    assert!(ScanSurface::of(&[], SURFACE).is_none());
-    assert!(ScanSurface::of(&[Point::new(0.0, 0.0, 0.0)], SURFACE).is_none());
+    assert!(ScanSurface::of(ScanRays::met(&[]), SURFACE).is_none());
+    assert!(ScanSurface::of(ScanRays::met(&[Point::new(0.0, 0.0, 0.0)]), SURFACE).is_none());
 }
 
 #[test]
@@ -404,7 +405,7 @@ fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() 
         let below = (1..=40).map(|i| i as f32 * -0.3).flat_map(ring);
         let above = (0..8).map(|i| i as f32 * apart_deg).flat_map(ring);
         let points: Vec<_> = below.chain(above).filter(|_| random.random_range(0..50) > 0).collect();
-        let surface = ScanSurface::of(&points, SURFACE).unwrap();
+        let surface = ScanSurface::of(ScanRays::met(&points), SURFACE).unwrap();
         let gap_max_m = 0.15;
         let sees_through = |place| surface.sees_through(place, 0.087, gap_max_m);
         let (mut asked, mut seen) = (0, 0);
@@ -477,7 +478,7 @@ fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
         for (yaw_deg, lost) in [0.0, 20.0, 40.0].into_iter().flat_map(|yaw| [(yaw, u32::MAX), (yaw, 50)]) {
             let sensor = Holed { step_deg, hole_deg, yaw_deg };
             let points = sensor.scan(lost, &mut random);
-            let surface = ScanSurface::of(&points, SURFACE).unwrap();
+            let surface = ScanSurface::of(ScanRays::met(&points), SURFACE).unwrap();
             let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
             let sees_through = |place| surface.sees_through(place, 0.87 * voxel_m, 1.5 * voxel_m);
             for voxels_wide in [1.2, 1.65, 2.0, 2.3, 2.8, 3.3] {
@@ -530,7 +531,7 @@ fn what_is_gone_is_seen_well_beyond_though_rays_are_lost() {
 fn what_no_ray_met_is_not_seen_through_by_a_sensor_that_moved() {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let sensor = Holed { step_deg: [0.2, 1.0], hole_deg: [f32::INFINITY, 2.0], yaw_deg: 0.0 };
-    let surface = ScanSurface::of(&sensor.scan(u32::MAX, &mut random), SURFACE).unwrap();
+    let surface = ScanSurface::of(ScanRays::met(&sensor.scan(u32::MAX, &mut random)), SURFACE).unwrap();
     let voxel_m = 0.1f32;
     let distance_m = 2.2 * voxel_m / 2f32.to_radians();
     for moved_m in [0.0, 0.05, 0.2, 0.5] {
@@ -541,4 +542,41 @@ fn what_no_ray_met_is_not_seen_through_by_a_sensor_that_moved() {
             assert!(!surface.sees_through(place, radius_m, 1.5 * voxel_m), "{place:?}, moved by {moved_m} m");
         }
     }
+}
+
+/// A wall across the x axis at 5 m where y < 0; rays to the other side ran on beyond 8 m.
+fn half_open() -> Vec<Point> {
+    let directions = (-60..=60).flat_map(|side| (-30..=30).map(move |up| [side as f32, up as f32]));
+    directions
+        .map(|[side, up]| {
+            let direction = nalgebra::Vector3::new(1.0, side.to_radians().tan(), up.to_radians().tan());
+            let range_m = if side < 0.0 { 5.0 * direction.norm() } else { 8.0 };
+            Point::from(<[f32; 3]>::from(direction.normalize() * range_m.min(8.0)))
+        })
+        .collect()
+}
+
+#[test]
+fn where_rays_ran_on_is_free_and_says_nothing_of_what_was_met() {
+    let sweep = Sweep { open_m: 8.0, ..Sweep::standing(60.0) };
+    let image = RangeImage::of_points(&half_open(), sweep, IMAGE_BYTES_MAX).unwrap();
+    let back = RangeImage::from_bytes(&image.to_bytes()).unwrap();
+    assert!(back == image && image.to_bytes().len() == image.stored_bytes());
+    let all_met = RangeImage::of_points(&half_open(), Sweep::standing(60.0), IMAGE_BYTES_MAX).unwrap();
+    assert_eq!(
+        all_met.to_bytes().len() + 4,
+        image.to_bytes().len(),
+        "images of which all was met are as they were"
+    );
+    let place = [6.0, 2.0, 0.3];
+    assert!(image.sees_through(place) && all_met.sees_through(place));
+    assert_eq!(all_met.sight(place, 0.1), Sight::Contradicts);
+    assert_eq!(image.sight(place, 0.1), Sight::NotSeen);
+    assert_eq!(image.sight([4.0, -2.0, 0.3], 0.1), Sight::Contradicts, "the wall was met");
+    let open_met =
+        |image: &RangeImage| image.met(10_000, 1.0).iter().filter(|met| met.offset[1] > 0.3).count();
+    assert!(open_met(&image) == 0 && open_met(&all_met) > 20);
+    let mut bytes = image.to_bytes();
+    bytes[13..17].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(matches!(RangeImage::from_bytes(&bytes), Err(RangeImageError::Open(_))));
 }

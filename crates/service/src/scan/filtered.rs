@@ -50,6 +50,7 @@ impl<'a> FilteredScan<'a> {
             points: self.filtered.surroundings().points,
             times_s: self.filtered.surroundings().times_s,
             no_returns: self.filtered.no_returns(),
+            beyond: self.filtered.beyond(),
             of_robot: self.filtered.of_robot(),
             points_skipped: self.filtered.skipped.total(),
             gravity: self.request.gravity,

@@ -82,6 +82,19 @@ pub(super) fn aisle(period_m: f64, length_m: f64) -> Vec<Object> {
     objects
 }
 
+/// Level ground under the open sky, and containers around its middle.
+pub(super) fn yard(seed: u64) -> Vec<Object> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut shapes = vec![Shape::cuboid([0.0, 0.0, -WALL_M], [120.0, 120.0, WALL_M])];
+    for quarter in 0..4 {
+        let angle: f64 = (f64::from(quarter) + random.random_range(0.2..0.8)) * FRAC_PI_2;
+        let distance = random.random_range(15.0..25.0);
+        let place = [distance * angle.cos(), distance * angle.sin(), 0.0];
+        shapes.push(Shape::cuboid(place, [random.random_range(2.5..6.0), 2.4, 2.6]));
+    }
+    shapes.into_iter().map(|shape| Object::new(vec![shape])).collect()
+}
+
 /// People that stand about `(x, y)`, at 0.8 to 2.5 m from there, in front of a share of the view.
 pub(super) fn crowd(seed: u64, people: usize, [x, y]: [f64; 2]) -> Vec<Object> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -44,6 +44,12 @@ impl Scene {
         Self { objects: places::aisle(period_m, length_m) }
     }
 
+    /// A yard under the open sky: level ground of 120 x 120 m about the origin, and four containers on it, 15 to 25 m from its middle, drawn
+    /// from `seed`.
+    pub fn yard(seed: u64) -> Self {
+        Self { objects: places::yard(seed) }
+    }
+
     /// This scene, with people drawn from `seed` about a place.
     pub fn with_people(&self, seed: u64, people: usize, about: [f64; 2]) -> Self {
         let mut objects = self.objects.clone();

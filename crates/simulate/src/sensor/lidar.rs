@@ -53,6 +53,22 @@ impl SpinningLidar {
             .collect()
     }
 
+    /// [`SpinningLidar::scan`] of a driver that tells where nothing returned: by a point at `no_return_m` in that direction.
+    pub fn scan_telling_no_returns(
+        &self,
+        scene: &Scene,
+        map_from_sensor: &Pose,
+        no_return_m: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Vec<Point> {
+        let mut points = self.scan(scene, map_from_sensor, rng);
+        let shots = (0..self.azimuths).flat_map(|azimuth| (0..self.rings).map(move |ring| (azimuth, ring)));
+        for (end, (azimuth, ring)) in points.iter_mut().zip(shots).filter(|(end, _)| !end.is_finite()) {
+            *end = point(self.direction(azimuth, ring), Some(no_return_m));
+        }
+        points
+    }
+
     /// One scan of a sensor that moves during its turn: the points as in [`SpinningLidar::scan`], each in the sensor's
     /// frame at its own time, and these times.
     ///

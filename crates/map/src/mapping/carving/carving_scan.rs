@@ -1,11 +1,12 @@
 //! A scan that carves: the voxels that it saw through.
 
 use super::settings::CarvingSettings;
+use super::thin_things::{ThinThings, with_what_hangs_on};
 use crate::geometry::{Point, Pose};
 use crate::map::{MultiResolutionMap, Region, ScanRecord};
 use crate::mapping::error::MappingError;
 use crate::util::StopSignal;
-use crate::visibility::{ScanSurface, SurfaceSettings};
+use crate::visibility::{ScanRays, ScanSurface, SurfaceSettings};
 use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
 
 /// Blocks of voxels that are looked at between two looks at the stop signal.
@@ -42,8 +43,8 @@ impl Carving {
 
 /// A scan that carves, where it was found.
 pub(in crate::mapping) struct CarvingScan<'a> {
-    /// All that stood in the way of a ray, the robot itself too (sensor frame, finite).
-    pub(in crate::mapping) points: &'a [Point],
+    /// Where its rays ended, those at the robot itself too.
+    pub(in crate::mapping) rays: ScanRays<'a>,
     pub(in crate::mapping) record: &'a ScanRecord,
     /// How far the sensor moved while the points were measured, meters.
     pub(in crate::mapping) moved_m: f64,
@@ -66,7 +67,7 @@ impl CarvingScan<'_> {
             noise_m: resolution_m as f32,
             spacing_m: (SAMPLE_SHARE * resolution_m * f64::from(2 * settings.margin_voxels + 1)) as f32,
         };
-        let surface = ScanSurface::of(self.points, surface);
+        let surface = ScanSurface::of(self.rays, surface);
         let region = surface.as_ref().and_then(|surface| self.seen_region(surface, settings));
         let (Some(surface), Some(region)) = (surface, region) else { return Ok(Carving::default()) };
         let (occupied, revision) = occupied_in(map, &region, stop);
@@ -85,7 +86,16 @@ impl CarvingScan<'_> {
             let sight = &sight;
             mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| sight.sees_through(*voxel))
         };
-        let voxels = stop.paced(candidates.blocks(), BLOCKS_PER_LOOK).flat_map(seen_through).collect();
+        let missed: VoxelSet =
+            stop.paced(candidates.blocks(), BLOCKS_PER_LOOK).flat_map(seen_through).collect();
+        let map_from_sensor = &self.record.pose.map_from_sensor;
+        let thin = ThinThings::among(&candidates, &surface, map.lattice(), map_from_sensor, sight.radius_m);
+        let gone = |&(block, ref mask): &(VoxelKey, BlockMask)| {
+            let thin = &thin;
+            mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| !thin.may_be_at(*voxel))
+        };
+        let wide: Vec<VoxelKey> = stop.paced(missed.blocks(), BLOCKS_PER_LOOK).flat_map(gone).collect();
+        let voxels = with_what_hangs_on(wide, &missed);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
         }

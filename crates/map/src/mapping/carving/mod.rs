@@ -9,12 +9,14 @@
 //! * only where each direction in which the voxel lies was seen to end behind it;
 //! * never at a rim: where a direction beside these was not seen, or ends in front of the voxel on another surface. A surface
 //!   that is seen at a grazing angle is one rim beside the other, so nothing is carved in front of it or from it;
+//! * not what is narrow as it is seen from the sensor, where its rays lie farther apart than it may be thick: poles, edges of tables;
 //! * only as far as the points lie as close to each other as voxels do, or half as far again, and within a range.
 
 mod carving_scan;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod thin_things;
 
 pub use carving_scan::Carving;
 pub(super) use carving_scan::CarvingScan;

@@ -9,6 +9,7 @@ use crate::geometry::{Point, Pose};
 use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::mapping::MappingError;
 use crate::util::StopSignal;
+use crate::visibility::ScanRays;
 use crate::voxel::{VoxelKey, VoxelSet};
 
 const RESOLUTION_M: f64 = 0.1;
@@ -76,7 +77,7 @@ fn record(map: &MultiResolutionMap, pose: &Pose, points: &[Point]) -> ScanRecord
 /// What a scan carves of a map.
 fn carved(map: &MultiResolutionMap, pose: &Pose, points: &[Point], settings: &CarvingSettings) -> VoxelSet {
     let record = record(map, pose, points);
-    let scan = CarvingScan { points, record: &record, moved_m: 0.0 };
+    let scan = CarvingScan { rays: ScanRays::met(points), record: &record, moved_m: 0.0 };
     scan.carve(map, settings, StopSignal::NEVER).unwrap().voxels
 }
 
@@ -202,7 +203,7 @@ fn carving_ends_when_it_is_stopped() {
     let pose = any_pose(&mut random, &Vec::new());
     let points = scan(&mut random, &Vec::new(), &pose, 0.0);
     let record = record(&map, &pose, &points);
-    let scan = CarvingScan { points: &points, record: &record, moved_m: 0.0 };
+    let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m: 0.0 };
     let gone = || true;
     let stopped = scan.carve(&map, &CarvingSettings::default(), StopSignal::when(&gone));
     assert_eq!(stopped, Err(MappingError::Stopped));
@@ -217,7 +218,7 @@ fn a_sensor_that_moves_meanwhile_carves_no_more_than_one_that_stands() {
     let points = scan(&mut random, &Vec::new(), &pose, 0.0);
     let record = record(&map, &pose, &points);
     let of = |moved_m| {
-        let scan = CarvingScan { points: &points, record: &record, moved_m };
+        let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m };
         scan.carve(&map, &CarvingSettings::default(), StopSignal::NEVER).unwrap().voxels
     };
     let (still, moving) = (of(0.0), of(0.1));

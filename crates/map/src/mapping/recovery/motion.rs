@@ -28,8 +28,7 @@ pub(super) fn motion_between(
     let map = MultiResolutionMap::new(*settings).ok()?;
     let robot = RobotName::new("before").ok()?;
     let taken_at = MappedScan::new(robot, Pose::identity());
-    let image =
-        RangeImage::of_points(before, Sweep { range_max_m: RANGE_MAX_M, moved_m: 0.0 }, IMAGE_BYTES_MAX);
+    let image = RangeImage::of_points(before, Sweep::standing(RANGE_MAX_M), IMAGE_BYTES_MAX);
     let viewpoint = image.map(|image| ViewpointRecord { image, displaced: Vec::new() });
     let record = ScanRecord::of_points(taken_at, before, map.lattice());
     map.committer().insert_scan(ScanRecord { viewpoint, ..record });
