@@ -179,7 +179,7 @@ impl From<ReplicaError> for Failure {
         let code = match error {
             ReplicaError::Client(error) => return error.into(),
             ReplicaError::Question(error) => return error.into(),
-            ReplicaError::Damaged(_) => Code::Damaged,
+            ReplicaError::Damaged(_) | ReplicaError::Diverged { .. } => Code::Damaged,
             ReplicaError::Silent(_) => Code::Timeout,
             ReplicaError::TooLarge(_) | ReplicaError::TooManyViewpoints(_) => Code::TooLarge,
         };
