@@ -218,7 +218,7 @@ async fn a_copy_of_what_was_lost_when_an_older_data_folder_was_put_back_gets_the
     }
     drop(daemon.stop().await);
 
-    let daemon = Daemon::start_in(cold, |config| config.grpc.listen = address.into()).await;
+    let daemon = Daemon::start_in(cold, |config| config.grpc.listen = address).await;
     for count in 20..29 {
         daemon.put_in("a", &row(count)).await;
     }
