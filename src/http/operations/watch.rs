@@ -35,7 +35,6 @@ pub(crate) struct WatchParams {
     #[param(format = "uuid")]
     map_uuid: Option<String>,
     /// The map's content hash at that revision, as the client was told: where the map had another, the whole state comes first.
-    #[param(example = "91a0c8f5f6d1e2b3")]
     since_content_hash: Option<String>,
     /// Tell of the voxels of this level that came and went; without, of the finest as they were recorded.
     delta_level: Option<u32>,
