@@ -72,6 +72,7 @@ operations! {
     ClassifyPointsStream: Some(Read), grpc "/mrol.v1.Occupancy/ClassifyPointsStream";
     ListFrontiers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListFrontiers",     http POST "/v1/maps/{map}/frontiers";
     ProjectGrid:       Some(Read),  grpc "/mrol.v1.Occupancy/ProjectGrid",       http POST "/v1/maps/{map}/grid";
+    StreamGrid:        Some(Read),  grpc "/mrol.v1.Occupancy/StreamGrid",        http POST "/v1/maps/{map}/grid/tiles";
     ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
     GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";
     ListObservers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListObservers",     http GET "/v1/maps/{map}/observers";

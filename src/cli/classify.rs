@@ -8,11 +8,10 @@ use serde::Serialize;
 
 use super::asked::AskedOptions;
 use super::remote::MapOptions;
+use super::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
-use mrol::console::points_of;
-use mrol_map::geometry::Point;
 use mrol_map::util::Keyword;
 use mrol_service::ClassifyQuestion;
 
@@ -32,23 +31,22 @@ pub(super) struct Classify {
     #[arg(required_unless_present = "point", conflicts_with = "point")]
     points_file: Option<PathBuf>,
     /// A point to ask about, meters; may be repeated
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
-    point: Vec<Point>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
+    point: Vec<[f64; 3]>,
     #[command(flatten)]
     map: MapOptions,
+    #[command(flatten)]
+    survey: SurveyOptions,
     #[command(flatten)]
     asked: AskedOptions,
 }
 
 impl Classify {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { points_file, point, map, asked } = self;
-        let points = match &points_file {
-            Some(path) => points_of(path)?,
-            None => point,
-        };
-        let question = ClassifyQuestion { asked: asked.asked(), points: points.clone().into() };
+        let Self { points_file, point, map, survey, asked } = self;
         let client = map.server.connect().await?;
+        let points = survey.points(&client, &map.name, points_file.as_deref(), &point).await?;
+        let question = ClassifyQuestion { asked: asked.asked(), points: points.clone().into() };
         let answered = client.classify_points(&map.name, question).await?;
         let (states, revision) = (answered.answer, answered.version.revision);
         if states.points != points.len() {

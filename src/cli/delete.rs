@@ -7,12 +7,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::remote::MapOptions;
+use super::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::count;
 use mrol::console::parse;
-use mrol::console::points_of;
-use mrol_map::geometry::Point;
 use mrol_map::map::{Region, RequestId};
 use mrol_service::{Deletion, DeletionAnswer, DeletionTarget};
 
@@ -33,6 +32,8 @@ pub(super) struct Delete {
     #[command(flatten)]
     map: MapOptions,
     #[command(flatten)]
+    survey: SurveyOptions,
+    #[command(flatten)]
     target: Target,
     /// Level of the voxels; all their descendants are deleted too
     #[arg(long, default_value_t = 0)]
@@ -52,8 +53,8 @@ struct Target {
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// The voxel of a point, meters; may be repeated
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
-    point: Vec<Point>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
+    point: Vec<[f64; 3]>,
     /// The voxels in a box: smallest and largest corner, meters
     #[arg(long = "box", value_name = "X Y Z X Y Z", allow_hyphen_values = true, value_parser = parse::cuboid)]
     cuboid: Option<Region>,
@@ -67,25 +68,29 @@ struct Target {
 
 impl Delete {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, target, level, request_id, not_seen_since } = self;
-        let target = target.resolve()?.not_seen_since(not_seen_since).map_err(CliError::usage)?;
-        let deletion = Deletion { target, level, request_id };
+        let Self { map, survey, target, level, request_id, not_seen_since } = self;
+        let region = target.region().map(DeletionTarget::Region);
+        let check = |of: DeletionTarget| of.not_seen_since(not_seen_since).map_err(CliError::usage);
+        // What needs no server is said before one is called.
+        let region = region.map(check).transpose()?;
         let client = map.server.connect().await?;
+        let target = match region {
+            Some(region) => region,
+            None => {
+                let file = target.points.as_deref();
+                let points = survey.points(&client, &map.name, file, &target.point).await?;
+                check(DeletionTarget::Points(points.into()))?
+            }
+        };
+        let deletion = Deletion { target, level, request_id };
         let answer = client.delete_voxels(&map.name, deletion).await?;
         output.print(&Deleted::from(answer))
     }
 }
 
 impl Target {
-    fn resolve(self) -> Result<DeletionTarget, CliError> {
-        if let Some(region) = self.cuboid.or(self.sphere).or(self.oriented_box) {
-            return Ok(DeletionTarget::Region(region));
-        }
-        let points = match self.points {
-            Some(path) => points_of(&path)?,
-            None => self.point,
-        };
-        Ok(DeletionTarget::Points(points.into()))
+    fn region(&self) -> Option<Region> {
+        self.cuboid.or(self.sphere).or(self.oriented_box)
     }
 }
 

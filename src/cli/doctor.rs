@@ -11,7 +11,9 @@ use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::{bytes, count};
 use mrol_map::map::MapName;
-use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, diagnose_file, set_aside};
+use mrol_store::doctor::{
+    AsideFile, Diagnosis, SetAside, diagnose, diagnose_file, set_aside, set_file_aside,
+};
 use mrol_store::{DataDir, StoreSettings};
 
 const EXAMPLES: &str = "\
@@ -25,7 +27,8 @@ something is wrong.
 
 --set-aside makes a map of what can be read before the damage, and renames the damaged folder to NAME.UUID.damaged, as it
 is. Nothing is deleted. The new map has a uuid of its own, so that robots and planners notice, and undo does not reach
-behind its beginning. The folder stays, and is reported, until you remove it. Damaged snapshots, which a server sets
+behind its beginning. Of a damaged map file, as the first format has, nothing can be read: the file is renamed, and no map is
+made. The folder stays, and is reported, until you remove it. Damaged snapshots, which a server sets
 aside by itself, are removed together with the snapshots of their age.";
 
 /// Check a data folder, file by file, while no server uses it
@@ -82,11 +85,41 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
 }
 
 fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliError> {
-    match set_aside(data_dir, name)? {
-        None => output.say(format!("map {name} can be opened as it is")),
+    // A map file has no folder, and a map's folder may have a file beside it that the next start refuses.
+    let has_folder = data_dir.names()?.contains(name);
+    let has_file = data_dir.file_names()?.contains(name);
+    let of_folder = if has_folder || !has_file { set_aside(data_dir, name)? } else { None };
+    match of_folder {
+        None => match set_file_aside(data_dir, name)? {
+            None => output.say(format!("map {name} can be opened as it is")),
+            Some(file) => output.print(&FileAside { map: name.to_string(), set_aside: file, has_folder }),
+        },
         Some(SetAside { folder, revision, keep_outs, viewpoints }) => {
             output.note(format!("set aside: {}", folder.display()));
             output.print(&Opens { map: name.to_string(), revision, keep_outs, viewpoints })
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct FileAside {
+    map: String,
+    set_aside: PathBuf,
+    /// There is a map of that name besides the file.
+    #[serde(skip)]
+    has_folder: bool,
+}
+
+impl Display for FileAside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { map, set_aside, has_folder } = self;
+        write!(f, "set aside: {}; ", set_aside.display())?;
+        match has_folder {
+            true => write!(f, "map {map} opens as it is, without the file"),
+            false => write!(
+                f,
+                "nothing can be read of it, and there is no map {map} now: put a backup there with `mrol restore`"
+            ),
         }
     }
 }

@@ -22,7 +22,8 @@ EXAMPLES:
   mrol grid --map office --band \"0.1 1.8\" --cell 0.1 --area \"0 0 10 8\" --out office.pgm
   mrol grid --map office --out office.pgm --unknown               free is only what scans saw through
 
-Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read.";
+Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read. The
+server draws large grids in tiles; if the map changes meanwhile, each tile is of a revision of its own.";
 
 /// What names of descriptions end in.
 const DESCRIPTION: &str = "yaml";
@@ -65,15 +66,14 @@ impl DrawGrid {
         };
         let question = GridQuestion { asked: asked.asked(), scope };
         let client = map.server.connect().await?;
-        let answered = client.project_grid(&map.name, question).await?;
-        let grid = answered.answer;
+        let (grid, versions) = client.whole_grid(&map.name, question).await?;
         if grid.cells() == 0 {
             let message =
                 "the map has no voxel in this band: there is nothing to draw; give --area, or another --band";
             return Err(CliError::failed(message));
         }
         let description = write_files(&grid, &out)?;
-        output.print(&Drawn::of(&grid, &out, &description, answered.version.revision))
+        output.print(&Drawn::of(&grid, &out, &description, versions.map(|version| version.revision)))
     }
 }
 
@@ -112,11 +112,14 @@ struct Drawn {
     cells_occupied: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     cells_free: Option<usize>,
+    /// Of the first tile.
+    revision_first: u64,
+    /// Of the last tile.
     revision: u64,
 }
 
 impl Drawn {
-    fn of(grid: &Grid, image: &Path, description: &Path, revision: u64) -> Self {
+    fn of(grid: &Grid, image: &Path, description: &Path, [revision_first, revision]: [u64; 2]) -> Self {
         Self {
             image: image.display().to_string(),
             description: description.display().to_string(),
@@ -125,6 +128,7 @@ impl Drawn {
             origin_m: grid.origin_m,
             cells_occupied: ones(&grid.occupied),
             cells_free: grid.free.as_deref().map(ones),
+            revision_first,
             revision,
         }
     }
@@ -142,6 +146,9 @@ impl Display for Drawn {
             Some(free) => write!(f, "{occupied} of them occupied and {} free", count(free))?,
             None => write!(f, "{occupied} of them occupied")?,
         }
-        write!(f, ", at revision {}", self.revision)
+        match self.revision_first == self.revision {
+            true => write!(f, ", at revision {}", self.revision),
+            false => write!(f, ", at revisions {} to {}", self.revision_first, self.revision),
+        }
     }
 }

@@ -12,7 +12,7 @@ use mrol::console::MapReport;
 use mrol::console::Output;
 use mrol::console::parse;
 use mrol_client::{NewFilter, NewMap};
-use mrol_map::map::MapName;
+use mrol_map::map::{MapName, MapOrigin};
 use mrol_service::{MapList, UnavailableMap};
 
 const EXAMPLES: &str = "\
@@ -20,6 +20,8 @@ EXAMPLES:
   mrol maps create office --resolution 0.05 --levels 5
   mrol maps create yard --resolution 0.1 --no-filter --no-moments
                                                  for queries, in a small part of the memory
+  mrol maps create site --resolution 0.1 --origin \"388096 3948996 12\"
+                                                 for scans in the coordinates of a survey
   mrol maps list
   mrol maps show office                          voxels, memory and false positives of each level
   mrol maps show office --json
@@ -75,6 +77,9 @@ pub(super) struct NewMapOptions {
     /// Side of a finest voxel, meters
     #[arg(long, value_name = "METERS")]
     resolution: f64,
+    /// Where the map's origin lies in the coordinates of a survey: "x y z", meters. Kept with the map, for `--origin auto`
+    #[arg(long, value_name = "X Y Z", allow_hyphen_values = true, value_parser = parse::vector)]
+    origin: Option<[f64; 3]>,
     #[command(flatten)]
     rest: OptionalSettings,
 }
@@ -167,7 +172,8 @@ impl Display for Unavailable {
 }
 
 async fn create(map: Named, settings: NewMapOptions, output: Output) -> Result<(), CliError> {
-    let new = settings.rest.with_resolution(settings.resolution);
+    let origin = settings.origin.map(MapOrigin::new).transpose().map_err(CliError::usage)?;
+    let new = NewMap { origin, ..settings.rest.with_resolution(settings.resolution) };
     let (info, created) = map.server.connect().await?.create_map(&map.name, new).await?;
     output.print(&Made { created, map: MapReport::from(&info) })
 }

@@ -33,6 +33,7 @@ mod rays;
 mod remote;
 mod scan_report;
 mod snapshot;
+mod survey;
 mod undo;
 mod watch;
 

@@ -9,11 +9,10 @@ use serde::Serialize;
 use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
+use super::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
-use mrol::console::points_of;
-use mrol_map::geometry::Point;
 use mrol_map::planning::MeasuredTo;
 use mrol_service::NearestQuestion;
 
@@ -33,10 +32,12 @@ pub(super) struct Nearest {
     #[arg(required_unless_present = "point", conflicts_with = "point")]
     points_file: Option<PathBuf>,
     /// A point to ask about, meters; may be repeated
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
-    point: Vec<Point>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
+    point: Vec<[f64; 3]>,
     #[command(flatten)]
     map: MapOptions,
+    #[command(flatten)]
+    survey: SurveyOptions,
     /// How far to look, meters
     #[arg(long, value_name = "METERS")]
     radius: f64,
@@ -49,14 +50,11 @@ pub(super) struct Nearest {
 
 impl Nearest {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { points_file, point, map, radius, to, asked } = self;
-        let points = match &points_file {
-            Some(path) => points_of(path)?,
-            None => point,
-        };
+        let Self { points_file, point, map, survey, radius, to, asked } = self;
+        let client = map.server.connect().await?;
+        let points = survey.points(&client, &map.name, points_file.as_deref(), &point).await?;
         let question =
             NearestQuestion { asked: asked.asked(), points: points.clone().into(), radius_m: radius, to };
-        let client = map.server.connect().await?;
         let answered = client.find_nearest(&map.name, question).await?;
         let (nearest, revision) = (answered.answer, answered.version.revision);
         if nearest.len() != points.len() {

@@ -9,10 +9,12 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::remote::MapOptions;
+use super::survey::{SurveyOptions, named};
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
-use mrol::console::{count, percent, points_of};
+use mrol::console::{Survey, count, percent};
+use mrol_client::Client;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::Lookup;
 use mrol_service::{MapVersion, PointAnswer, PointQuery};
@@ -37,10 +39,12 @@ pub(super) struct Query {
     #[arg(required_unless_present = "point", conflicts_with = "point")]
     points_file: Option<PathBuf>,
     /// A point to ask about, meters; may be repeated
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
-    point: Vec<Point>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
+    point: Vec<[f64; 3]>,
     #[command(flatten)]
     map: MapOptions,
+    #[command(flatten)]
+    survey: SurveyOptions,
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
@@ -60,11 +64,12 @@ pub(super) struct Query {
 
 impl Query {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let points = match &self.points_file {
-            Some(path) => points_of(path)?,
-            None => self.point.clone(),
-        };
-        let answer = self.ask(&points).await?;
+        let client = self.map.server.connect().await?;
+        let file = self.points_file.as_deref();
+        let (points, survey) =
+            self.survey.exact(&client, &self.map.name, file, &self.point, self.pose.is_some()).await?;
+        let points = survey.near(&named(file), &points)?;
+        let answer = self.ask(&client, &points, &survey).await?;
         if let Some(path) = &self.out {
             fs::write(path, &answer.bitmap).map_err(CliError::writing(path))?;
         }
@@ -75,9 +80,8 @@ impl Query {
     }
 
     /// Queries all points, in batches on one stream.
-    async fn ask(&self, points: &[Point]) -> Result<Answer, CliError> {
-        let batches: Vec<_> = points.chunks(BATCH_POINTS).map(|points| self.query(points)).collect();
-        let client = self.map.server.connect().await?;
+    async fn ask(&self, client: &Client, points: &[Point], survey: &Survey) -> Result<Answer, CliError> {
+        let batches: Vec<_> = points.chunks(BATCH_POINTS).map(|points| self.query(points, survey)).collect();
         let start = Instant::now();
         let mut answers = client.query_stream(&self.map.name, tokio_stream::iter(batches)).await?;
         let mut all = Answer::default();
@@ -92,10 +96,10 @@ impl Query {
         Ok(all)
     }
 
-    fn query(&self, points: &[Point]) -> PointQuery {
+    fn query(&self, points: &[Point], survey: &Survey) -> PointQuery {
         PointQuery {
             points: points.to_vec().into(),
-            map_from_points: self.pose,
+            map_from_points: self.pose.map(|pose| survey.to_map(&pose)),
             level: self.level,
             lookup: self.lookup,
             min_revision: None,

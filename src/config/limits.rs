@@ -44,6 +44,7 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.min_revision_wait_max_s", limits.min_revision_wait_max_s),
         ("limits.question_time_max_s", limits.question_time_max_s),
         ("limits.long_question_time_max_s", limits.long_question_time_max_s),
+        ("limits.grid_time_max_s", limits.grid_time_max_s),
         ("limits.alignment_time_max_s", limits.alignment_time_max_s),
         ("limits.insertion_time_max_s", limits.insertion_time_max_s),
         ("limits.undo_time_max_s", limits.undo_time_max_s),

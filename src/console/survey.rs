@@ -77,19 +77,32 @@ impl Survey {
     /// The file cannot be read, or its points are still too far from 0 for f32.
     pub fn read(&self, file: &Path) -> Result<Vec<Point>, CliError> {
         let points = read_exact_points(file)?;
-        if is_coarse(&points, &self.shift, self.resolution_m) {
-            let [x, y, z] = first_place(&points).unwrap_or_default();
-            return Err(CliError::failed(format!(
-                "{}: f32 rounds its points, as that near {x} {y} {z}, by more than 1/16 of a voxel of {} m: give \
-                 --origin \"{x} {y} {z}\" (or --origin auto), which is subtracted from all scans and kept in the map",
-                file.display(),
-                self.resolution_m
-            )));
-        }
+        self.check(&file.display().to_string(), &points)?;
         let zero = Point3::origin();
         // 0 0 0 says that nothing returned, wherever the survey is.
         let shifted = |point: Point3<f64>| if point == zero { point } else { point - self.shift };
         Ok(points.into_iter().map(|point| Point::from(shifted(point))).collect())
+    }
+
+    /// Points that messages call `name`, near 0.
+    ///
+    /// # Errors
+    /// They are still too far from 0 for f32.
+    pub fn near(&self, name: &str, points: &[Point3<f64>]) -> Result<Vec<Point>, CliError> {
+        self.check(name, points)?;
+        Ok(points.iter().map(|point| Point::from(point - self.shift)).collect())
+    }
+
+    fn check(&self, name: &str, points: &[Point3<f64>]) -> Result<(), CliError> {
+        if !is_coarse(points, &self.shift, self.resolution_m) {
+            return Ok(());
+        }
+        let [x, y, z] = first_place(points).unwrap_or_default();
+        Err(CliError::failed(format!(
+            "{name}: f32 rounds its points, as that near {x} {y} {z}, by more than 1/16 of a voxel of {} m: give \
+             --origin \"{x} {y} {z}\" (or --origin auto), which is subtracted from all points and is the origin of the map",
+            self.resolution_m
+        )))
     }
 
     /// The pose in the map of a scan whose pose in the survey is known, for its points as [`Survey::read`] gives them.

@@ -27,6 +27,7 @@ impl Occupancy for Adapter {
     type FindNearestStreamStream = Answers<pb::FindNearestResponse>;
     type ClassifyPointsStreamStream = Answers<pb::ClassifyPointsResponse>;
     type WatchStream = BoxStream<pb::WatchResponse>;
+    type StreamGridStream = BoxStream<pb::GridTile>;
 
     async fn query_points(
         &self,
@@ -207,6 +208,17 @@ impl Occupancy for Adapter {
         request: Request<pb::ProjectGridRequest>,
     ) -> Result<Response<pb::ProjectGridResponse>, Status> {
         self.ask::<GridQuestion, _, _>(request).await
+    }
+
+    async fn stream_grid(
+        &self,
+        request: Request<pb::ProjectGridRequest>,
+    ) -> Result<Response<Self::StreamGridStream>, Status> {
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, question) = request.into_inner().try_into().map_err(status_of)?;
+        let tiles = service.grid_tiles(&map, question).await.map_err(status_of)?;
+        let tiles = tiles.into_stream(self.admission.told_to_drain());
+        Ok(Response::new(Box::pin(tiles.map(|tile| Ok(tile.map_err(status_of)?.into())))))
     }
 }
 

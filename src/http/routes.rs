@@ -45,6 +45,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::ClassifyPoints => on(method, question::classify::classify_points),
         Operation::ListFrontiers => on(method, question::frontiers::list_frontiers),
         Operation::ProjectGrid => on(method, question::grid::project_grid),
+        Operation::StreamGrid => on(method, question::grid::stream_grid),
         Operation::DeleteVoxels => on(method, deletions::delete),
         Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),

@@ -155,5 +155,17 @@ fn a_damaged_map_file_of_the_first_format_is_a_problem_and_one_that_is_well_is_t
         let told = String::from_utf8(told.stdout).unwrap();
         assert!(told.contains("map office: NOT WELL") && told.contains("office.mrol"), "{told}");
         assert_eq!(std::fs::read(&file).unwrap(), damaged, "looking changed nothing");
+
+        let aside = &objects(&["doctor", &sequence.path("data"), "--set-aside", "office"])[0];
+        let aside = Path::new(aside["set_aside"].as_str().unwrap()).to_owned();
+        assert_eq!((std::fs::read(&aside).unwrap().as_slice(), file.exists()), (damaged, false));
+        let told = mrol(&["doctor", &sequence.path("data")]).assert().code(0).get_output().clone();
+        let told = String::from_utf8(told.stderr).unwrap();
+        assert!(told.contains(aside.to_str().unwrap()), "{told}");
+        std::fs::remove_file(aside).unwrap();
     }
+    std::fs::write(&file, &bytes).unwrap();
+    let told = mrol(&["doctor", &sequence.path("data"), "--set-aside", "office"]).assert().code(0);
+    assert!(String::from_utf8(told.get_output().stdout.clone()).unwrap().contains("can be opened as it is"));
+    assert_eq!(std::fs::read(&file).unwrap(), bytes);
 }

@@ -123,3 +123,49 @@ fn a_question_waits_for_a_revision_as_long_as_it_may() {
     let told = complaint(&[&BALL[..], &ahead, &["--server", &building.daemon.grpc]].concat(), 1);
     assert!(told.contains("revision"), "{told}");
 }
+
+/// Points of a survey are the map's where its origin is subtracted, and refused where f32 would round them to other voxels.
+#[test]
+fn points_of_a_survey_are_asked_about_exactly() {
+    let (daemon, folder) = (Process::start("", &[]), tempfile::tempdir().unwrap());
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let at = [388_096.0, 3_948_996.0, 12.0];
+    let places: Vec<[f64; 3]> = (0..400).map(|i| [0.125 + 0.25 * f64::from(i), 0.0125, 0.0125]).collect();
+    let lines = |shift: [f64; 3]| {
+        let line = |p: &[f64; 3]| format!("{} {} {}\n", p[0] + shift[0], p[1] + shift[1], p[2] + shift[2]);
+        places.iter().map(line).collect::<String>()
+    };
+    std::fs::write(path("local.xyz"), lines([0.0; 3])).unwrap();
+    std::fs::write(path("survey.xyz"), lines(at)).unwrap();
+    let on = |arguments: &[&str]| objects(&[arguments, &["--server", &daemon.grpc]].concat());
+    let origin = ["--origin", "388096 3948996 12"];
+    let made = &on(&[&["maps", "create", "a", "--resolution", "0.025"], &origin[..]].concat())[0];
+    assert_eq!(made["settings"]["origin_m"], json!(at), "{made}");
+    let answer = &on(&["insert", &path("survey.xyz"), "--map", "a", "--origin", "auto"])[0];
+    assert_eq!(answer["accepted"], true, "{answer}");
+
+    let (survey, one) = (path("survey.xyz"), "388146.125,3948996.0125,12.0125");
+    let query = |arguments: &[&str]| on(&[&["query", "--map", "a"], arguments].concat());
+    assert_eq!(query(&[&survey, "--origin", "auto"])[0]["occupied"], 400);
+    assert_eq!(query(&[&[survey.as_str()][..], &origin].concat())[0]["occupied"], 400);
+    assert_eq!(query(&["--point", one, "--origin", "auto"])[0]["occupied"], true);
+    let classes = on(&["classify", "--map", "a", &survey, "--origin", "auto"]);
+    assert!(classes.len() == 400 && classes.iter().all(|line| line["state"] == "occupied"));
+    let nearest = on(&["nearest", "--map", "a", &survey, "--radius", "0.1", "--origin", "auto"]);
+    assert!(nearest.iter().all(|line| line["distance_m"] == 0.0));
+    for command in [
+        vec!["query", &survey, "--map", "a"],
+        vec!["query", "--point", one, "--map", "a"],
+        vec!["classify", &survey, "--map", "a"],
+        vec!["nearest", &survey, "--map", "a", "--radius", "0.1"],
+        vec!["delete", "--points", &survey, "--map", "a"],
+        vec!["localize", &survey, "--name", "a"],
+    ] {
+        let refused = complaint(&[&command[..], &["--server", &daemon.grpc]].concat(), 1);
+        assert!(refused.contains("by more than 1/16 of a voxel of 0.025 m"), "{command:?}: {refused}");
+    }
+    let wrong = ["query", &survey, "--map", "a", "--origin", "1 2 3", "--server", &daemon.grpc];
+    assert!(complaint(&wrong, 2).contains("that of the map is [388096.0, 3948996.0, 12.0]"));
+    let removed = on(&["delete", "--points", &survey, "--map", "a", "--origin", "auto"]);
+    assert_eq!(removed[0]["removed"], 400);
+}

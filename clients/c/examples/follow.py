@@ -47,6 +47,7 @@ class Options(Structure):
         ("with_filter", c_uint8),
         ("without_viewpoints", c_uint8),
         ("reserved", c_uint8 * 5),
+        ("age_max_ms", c_uint64),
     ]
 
 

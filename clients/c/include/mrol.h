@@ -99,7 +99,9 @@ enum {
     /* What the server sent makes no sense: another program, or another version. */
     MROL_DAMAGED = 8,
     /* A defect of this library, or the system has no thread for it. */
-    MROL_INTERNAL = 9
+    MROL_INTERNAL = 9,
+    /* The server was heard longer ago than age_max_ms allows; `reason` is replica_stale. */
+    MROL_STALE = 10
 };
 
 /* Why a call failed. Every function takes NULL in its place. It is written on failure alone. */
@@ -169,6 +171,10 @@ typedef struct mrol_replica_options {
     uint8_t without_viewpoints;
     /* Not used: zero. */
     uint8_t reserved[5];
+    /* How long ago the server may have been heard last for questions to be answered, milliseconds: more than its
+     * limits.watch_heartbeat_s. Questions to an older copy end with MROL_STALE. 0: answers may be of any age, which
+     * mrol_replica_get_status tells. */
+    uint64_t age_max_ms;
 } mrol_replica_options;
 
 /* Which structure of a level answers. */
@@ -585,8 +591,14 @@ typedef struct mrol_replica_status {
     uint64_t resets;
     /* 1 while the server is telling of changes. */
     uint8_t is_connected;
+    /* 1 once the replica follows no longer, since the server refused its key several times in a row: the copy stays as it is, and
+     * grows old. */
+    uint8_t has_ended;
     /* Not used: zero. */
-    uint8_t reserved[7];
+    uint8_t reserved[2];
+    /* How long ago the server was heard last, milliseconds, at most UINT32_MAX: a server that is there says something at least every
+     * limits.watch_heartbeat_s, so that an older copy may lack changes, even while is_connected is 1. */
+    uint32_t age_ms;
     /* Why the connection was lost last, UTF-8; empty while it stands. */
     char last_error[MROL_MESSAGE_BYTES];
 } mrol_replica_status;
@@ -721,7 +733,9 @@ const char *mrol_code_name(mrol_code code);
 /* Copies a map and follows it from then on; returns when the copy is complete. `replica` is set to none on failure.
  *
  * Where the connection breaks the replica comes back by itself and goes on from its last revision; meanwhile it answers as
- * it is. The system's look-up of a host's name is waited for, also beyond the time-out.
+ * it is, up to options.age_max_ms. A server that refuses the key several times in a row is not asked again: see has_ended of
+ * mrol_replica_status. Where the server goes on from an older data folder than the copy was made of, all is copied again. The
+ * system's look-up of a host's name is waited for, also beyond the time-out.
  *
  * Errors: MROL_INVALID_ARGUMENT, MROL_UNREACHABLE, MROL_REFUSED, MROL_TIMEOUT, MROL_TOO_LARGE, MROL_DAMAGED. */
 mrol_code mrol_replica_open(const mrol_replica_options *options, mrol_replica *replica, mrol_error *error);
@@ -742,6 +756,10 @@ uint64_t mrol_replica_revision(mrol_replica replica);
 /* Waits until the copy has `revision` of the map that it copies now, for instance one that an insertion returned. Errors:
  * MROL_TIMEOUT where it does not come within `timeout_ms`; MROL_CLOSED where the replica is closed meanwhile. */
 mrol_code mrol_replica_wait_for_revision(mrol_replica replica, uint64_t revision, uint64_t timeout_ms, mrol_error *error);
+
+/* Refuses a copy whose server was heard longer ago than `age_max_ms`, before a question whose answer must not be older. Errors:
+ * MROL_STALE. */
+mrol_code mrol_replica_check_age(mrol_replica replica, uint64_t age_max_ms, mrol_error *error);
 
 /* Says of each point whether its voxel is occupied, all at one revision.
  *

@@ -1,6 +1,7 @@
 //! The structs of mrol.h, field by field in the same order: a test compares every offset.
 
 use std::ffi::c_char;
+use std::time::Duration;
 
 use mrol_client::ReplicaStatus;
 use mrol_client::geometry::pose;
@@ -98,12 +99,13 @@ pub struct Options {
     pub(crate) with_filter: u8,
     pub(crate) without_viewpoints: u8,
     pub(crate) reserved: [u8; 5],
+    pub(crate) age_max_ms: u64,
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
 unsafe impl Question for Options {
     const NAME: &'static str = "options";
-    const BYTES_MIN: usize = size_of::<Self>();
+    const BYTES_MIN: usize = std::mem::offset_of!(Self, age_max_ms);
 }
 
 /// `mrol_point_query`.
@@ -188,13 +190,15 @@ pub struct Status {
     head_revision: u64,
     resets: u64,
     is_connected: u8,
-    reserved: [u8; 7],
+    has_ended: u8,
+    reserved: [u8; 2],
+    age_ms: u32,
     last_error: [u8; MESSAGE_BYTES],
 }
 
 impl Status {
-    /// The status of a replica; of one that `is_whole` with the map's content hash.
-    pub(crate) fn of(status: &ReplicaStatus, is_whole: bool) -> Self {
+    /// The status of a replica whose server was heard so long ago; of one that `is_whole` with the map's content hash.
+    pub(crate) fn of(status: &ReplicaStatus, age: Duration, is_whole: bool) -> Self {
         let version = mrol_client::service::MapVersion {
             revision: status.version.revision,
             map_uuid: status.map_uuid,
@@ -205,7 +209,9 @@ impl Status {
             head_revision: status.head_revision,
             resets: status.resets,
             is_connected: status.is_connected.into(),
-            reserved: [0; 7],
+            has_ended: status.has_ended.into(),
+            reserved: [0; 2],
+            age_ms: u32::try_from(age.as_millis()).unwrap_or(u32::MAX),
             last_error: terminated(status.last_error.as_deref().unwrap_or_default()),
         }
     }
@@ -261,11 +267,11 @@ mod tests {
             "mrol_map_version" MapVersion { map_uuid revision content_hash has_content_hash reserved }
             "mrol_replica_options" Options {
                 struct_size address map key ca_file certificate_file private_key_file open_timeout_ms silence_timeout_ms
-                blocks_max region_min_m region_max_m has_region with_filter without_viewpoints reserved
+                blocks_max region_min_m region_max_m has_region with_filter without_viewpoints reserved age_max_ms
             }
             "mrol_point_query" PointQuery { struct_size xyz count map_from_points level lookup keep_out reserved }
             "mrol_answer" Answer { version asked positive reserved }
-            "mrol_replica_status" Status { version head_revision resets is_connected reserved last_error }
+            "mrol_replica_status" Status { version head_revision resets is_connected has_ended reserved age_ms last_error }
             "mrol_client" ClientHandle { number }
             "mrol_credentials" CredentialFiles { key ca_file certificate_file private_key_file }
             "mrol_client_options" ClientOptions { struct_size address credentials timeout_ms }

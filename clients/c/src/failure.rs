@@ -2,7 +2,7 @@
 
 use std::ffi::CStr;
 
-use mrol_client::service::{ErrorCode, ServiceError};
+use mrol_client::service::{ErrorCode, Reason, ServiceError};
 use mrol_client::{ClientError, ReplicaError};
 
 /// What became of a call: `mrol_code`.
@@ -29,6 +29,8 @@ pub(crate) enum Code {
     Damaged = 8,
     /// A defect of the library.
     Internal = 9,
+    /// The copy is older than allowed.
+    Stale = 10,
 }
 
 impl Code {
@@ -44,6 +46,7 @@ impl Code {
         Self::TooLarge,
         Self::Damaged,
         Self::Internal,
+        Self::Stale,
     ];
 
     /// The code of a number.
@@ -64,6 +67,7 @@ impl Code {
             Self::TooLarge => c"MROL_TOO_LARGE",
             Self::Damaged => c"MROL_DAMAGED",
             Self::Internal => c"MROL_INTERNAL",
+            Self::Stale => c"MROL_STALE",
         }
     }
 }
@@ -143,6 +147,7 @@ impl From<ServiceError> for Failure {
         let code = match error.code() {
             ErrorCode::DeadlineExceeded => Code::Timeout,
             ErrorCode::Internal => Code::Internal,
+            _ if error.reason == Reason::ReplicaStale => Code::Stale,
             _ => Code::InvalidArgument,
         };
         Self::new(code, error.reason.as_str(), error.message)
@@ -179,7 +184,7 @@ impl From<ReplicaError> for Failure {
         let code = match error {
             ReplicaError::Client(error) => return error.into(),
             ReplicaError::Question(error) => return error.into(),
-            ReplicaError::Damaged(_) => Code::Damaged,
+            ReplicaError::Damaged(_) | ReplicaError::Diverged { .. } => Code::Damaged,
             ReplicaError::Silent(_) => Code::Timeout,
             ReplicaError::TooLarge(_) | ReplicaError::TooManyViewpoints(_) => Code::TooLarge,
         };

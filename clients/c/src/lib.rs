@@ -163,6 +163,21 @@ pub unsafe extern "C" fn mrol_replica_wait_for_revision(
     guarded(error, || REPLICAS.get(replica)?.wait_for_revision(revision, Duration::from_millis(timeout_ms)))
 }
 
+/// Refuses a copy that is too old: `mrol_replica_check_age` of mrol.h.
+///
+/// # Safety
+/// `error` is NULL or points to what mrol.h says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_replica_check_age(
+    replica: ReplicaHandle,
+    age_max_ms: u64,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let error = unsafe { Out::of(error, "error") };
+    guarded(error, || REPLICAS.get(replica)?.check_age(Duration::from_millis(age_max_ms)))
+}
+
 /// Asks about points: `mrol_replica_query_points` of mrol.h.
 ///
 /// # Safety

@@ -65,7 +65,7 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
         },
         silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
         filter: memory::flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
-        age_max: usual.age_max,
+        age_max: (options.age_max_ms > 0).then(|| Duration::from_millis(options.age_max_ms)),
     })
 }
 

@@ -105,7 +105,12 @@ impl OpenReplica {
 
     /// How far the replica is.
     pub(crate) fn status(&self) -> Status {
-        Status::of(&self.replica.status(), self.is_whole)
+        Status::of(&self.replica.status(), self.replica.age(), self.is_whole)
+    }
+
+    /// Refuses a copy whose server was heard longer ago than `age_max`.
+    pub(crate) fn check_age(&self, age_max: Duration) -> Result<(), Failure> {
+        Ok(self.replica.check_age(age_max)?)
     }
 
     /// Waits for a revision, or for the replica's end.

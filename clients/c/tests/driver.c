@@ -2,7 +2,8 @@
  *
  *     open ADDRESS MAP WITH_FILTER [X0 Y0 Z0 X1 Y1 Z1]
  *     query LEVEL LOOKUP KEEP_OUT POSE(7, or -) COUNT X Y Z ...
- *     status | version | wait REVISION TIMEOUT_MS | close
+ *     status | version | wait REVISION TIMEOUT_MS | check_age AGE_MAX_MS | close
+ *     open_with_key ADDRESS MAP KEY AGE_MAX_MS
  */
 #include "commands.h"
 #include <mrol.h>
@@ -48,6 +49,21 @@ static void open_replica(void) {
     if (!failed(mrol_replica_open(&options, &replica, &error), &error)) printf("ok");
 }
 
+static void open_with_key(void) {
+    mrol_error error;
+    mrol_replica_options options = mrol_replica_options_default();
+    options.address = strtok(NULL, " ");
+    options.map = strtok(NULL, " ");
+    options.key = strtok(NULL, " ");
+    options.age_max_ms = (uint64_t)number();
+    if (!failed(mrol_replica_open(&options, &replica, &error), &error)) printf("ok");
+}
+
+static void check_age(void) {
+    mrol_error error;
+    if (!failed(mrol_replica_check_age(replica, (uint64_t)number(), &error), &error)) printf("ok");
+}
+
 static void query_points(void) {
     mrol_error error;
     mrol_answer answer;
@@ -85,8 +101,9 @@ static void print_status(void) {
     mrol_replica_status status;
     if (failed(mrol_replica_get_status(replica, &status, &error), &error)) return;
     print_version(&status.version);
-    printf(" head=%llu resets=%llu connected=%u %s", (unsigned long long)status.head_revision,
-           (unsigned long long)status.resets, (unsigned)status.is_connected, status.last_error);
+    printf(" head=%llu resets=%llu connected=%u ended=%u %s %s", (unsigned long long)status.head_revision,
+           (unsigned long long)status.resets, (unsigned)status.is_connected, (unsigned)status.has_ended,
+           status.age_ms < 60000 ? "young" : "old", status.last_error);
 }
 
 static void print_copy(void) {
@@ -117,6 +134,8 @@ int main(void) {
         command = strtok(line, " ");
         if (command == NULL) fail_to_read();
         if (strcmp(command, "open") == 0) open_replica();
+        else if (strcmp(command, "open_with_key") == 0) open_with_key();
+        else if (strcmp(command, "check_age") == 0) check_age();
         else if (strcmp(command, "query") == 0) query_points();
         else if (strcmp(command, "status") == 0) print_status();
         else if (strcmp(command, "version") == 0) print_copy();

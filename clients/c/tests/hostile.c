@@ -422,6 +422,7 @@ static void bad_replicas(mrol_replica replica) {
         FAILS(mrol_replica_get_status(other, &status, &error), MROL_CLOSED, "not open");
         FAILS(mrol_replica_get_version(other, &version, &error), MROL_CLOSED, "not open");
         FAILS(mrol_replica_wait_for_revision(other, 0, 0, &error), MROL_CLOSED, "not open");
+        FAILS(mrol_replica_check_age(other, 1000, &error), MROL_CLOSED, "not open");
         FAILS(mrol_replica_query_points(other, &query, NULL, 0, NULL, &error), MROL_CLOSED, "not open");
         FAILS(mrol_replica_close(other, &error), MROL_CLOSED, "not open");
         MUST(mrol_replica_revision(other) == 0);
@@ -430,6 +431,8 @@ static void bad_replicas(mrol_replica replica) {
     FAILS(mrol_replica_get_version(replica, misaligned(&version), &error), MROL_INVALID_ARGUMENT, "version is at");
     FAILS(mrol_replica_wait_for_revision(replica, 2, 1, &error), MROL_TIMEOUT, "revision 2 did not come");
     MUST(mrol_replica_wait_for_revision(replica, 1, UINT64_MAX, NULL) == MROL_OK);
+    FAILS(mrol_replica_check_age(replica, 0, &error), MROL_STALE, "age_max is 0ns");
+    MUST(mrol_replica_check_age(replica, UINT64_MAX, NULL) == MROL_OK);
 }
 
 /* Damaged calls to a server change nothing, and a call that runs out of time ends. */

@@ -39,6 +39,7 @@ int main(void) {
     FIELD(mrol_replica_options, with_filter);
     FIELD(mrol_replica_options, without_viewpoints);
     FIELD(mrol_replica_options, reserved);
+    FIELD(mrol_replica_options, age_max_ms);
     SIZE(mrol_replica_options);
 
     FIELD(mrol_point_query, struct_size);
@@ -61,7 +62,9 @@ int main(void) {
     FIELD(mrol_replica_status, head_revision);
     FIELD(mrol_replica_status, resets);
     FIELD(mrol_replica_status, is_connected);
+    FIELD(mrol_replica_status, has_ended);
     FIELD(mrol_replica_status, reserved);
+    FIELD(mrol_replica_status, age_ms);
     FIELD(mrol_replica_status, last_error);
     SIZE(mrol_replica_status);
 

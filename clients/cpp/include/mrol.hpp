@@ -302,6 +302,11 @@ public:
         detail::check(mrol_replica_get_status(handle_, &status, &failed), failed);
         return status;
     }
+    // Refuses a copy whose server was heard longer ago, before a question whose answer must not be older (MROL_STALE).
+    void check_age(std::uint64_t age_max_ms) const {
+        mrol_error failed;
+        detail::check(mrol_replica_check_age(handle_, age_max_ms, &failed), failed);
+    }
     // Waits for a revision, that of an answer to an insertion for example.
     void wait_for(std::uint64_t revision, std::uint64_t timeout_ms = 10000) const {
         mrol_error failed;

@@ -89,6 +89,8 @@ int main(int count, char **words) {
     for (std::size_t i = 0; i < here.size(); i++) EXPECT(here[i] == there[i]);
     EXPECT(thrown([&] { here.at(2200); }) == "out_of_range");
     EXPECT(replica.query(std::vector<xyz>()).size() == 0);
+    replica.check_age(600000);
+    EXPECT(replica.status().has_ended == 0);
     EXPECT(replica.status().is_connected == 1 && replica.revision() == second.revision());
     EXPECT(replica.query(mrol::points(asked.data(), 3), 1).size() == 3);
 

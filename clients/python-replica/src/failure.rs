@@ -115,7 +115,7 @@ impl From<ReplicaError> for Failure {
         match error {
             ReplicaError::Client(error) => error.into(),
             ReplicaError::Question(error) => error.into(),
-            ReplicaError::Damaged(_) => Self::new("damaged", message),
+            ReplicaError::Damaged(_) | ReplicaError::Diverged { .. } => Self::new("damaged", message),
             ReplicaError::Silent(_) => Self::timed_out(message),
             ReplicaError::TooLarge(_) | ReplicaError::TooManyViewpoints(_) => Self::new("too_large", message),
         }

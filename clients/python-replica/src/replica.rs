@@ -14,8 +14,9 @@ use crate::questions::Questions;
 use crate::source::{OpenSource, Source};
 use crate::waiting::wait_for;
 
-/// How far a replica is: its version, the server's revision, whether it is connected, copies made, the last error.
-type Status = (Version, u64, bool, u64, Option<String>);
+/// How far a replica is: its version, the server's revision, whether it is connected, copies made, the last error, the seconds since
+/// the server was heard, whether it follows no longer.
+type Status = (Version, u64, bool, u64, Option<String>, f64, bool);
 
 /// A copy of a server's map.
 #[pyclass(frozen, extends = Questions, module = "mrol_replica._native")]
@@ -29,7 +30,7 @@ impl NativeReplica {
     /// Copies a map, and follows it.
     #[new]
     #[pyo3(signature = (address, map, *, key, ca, certificate, private_key, timeout_s, silence_s, region, blocks_max, bloom,
-        viewpoints))]
+        viewpoints, age_max_s))]
     #[expect(clippy::too_many_arguments, reason = "they are the keywords of a function of Python")]
     fn open(
         py: Python<'_>,
@@ -45,6 +46,7 @@ impl NativeReplica {
         blocks_max: Option<usize>,
         bloom: bool,
         viewpoints: bool,
+        age_max_s: Option<f64>,
     ) -> PyResult<PyClassInitializer<Self>> {
         guarded(|| {
             let mut credentials = Credentials::default();
@@ -68,6 +70,7 @@ impl NativeReplica {
                 filter: bloom.then(FilterSettings::default),
                 viewpoint_bytes_max: if viewpoints { usual.viewpoint_bytes_max } else { 0 },
                 silence_max: silence_s.map_or(usual.silence_max, Duration::from_secs_f64),
+                age_max: age_max_s.map(Duration::from_secs_f64),
                 ..usual
             };
             let map = MapName::new(map).map_err(ServiceError::from).map_err(Failure::from)?;
@@ -92,11 +95,22 @@ impl NativeReplica {
     fn status(slf: PyRef<'_, Self>) -> PyResult<Status> {
         guarded(|| {
             let source = slf.as_super().source.get()?;
-            let status = source.replica()?.status();
+            let replica = source.replica()?;
+            let (status, age_s) = (replica.status(), replica.age().as_secs_f64());
             let content_hash = slf.is_whole.then_some(status.version.hash);
             let version =
                 MapVersion { revision: status.version.revision, map_uuid: status.map_uuid, content_hash };
-            Ok((told(&version), status.head_revision, status.is_connected, status.resets, status.last_error))
+            let (head, connected, resets) = (status.head_revision, status.is_connected, status.resets);
+            Ok((told(&version), head, connected, resets, status.last_error, age_s, status.has_ended))
+        })
+    }
+
+    /// Refuses a copy whose server was heard longer ago than `age_max_s`.
+    fn check_age(slf: PyRef<'_, Self>, age_max_s: f64) -> PyResult<()> {
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let checked = source.replica()?.check_age(Duration::from_secs_f64(age_max_s));
+            Ok(checked.map_err(Failure::from)?)
         })
     }
 

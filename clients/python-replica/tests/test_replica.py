@@ -187,6 +187,42 @@ def test_keys(tmp_path: Path) -> None:
             assert secret not in repr(error)
 
 
+def test_a_revoked_key_is_given_up_and_old_answers_are_refused(tmp_path: Path) -> None:
+    keys = tmp_path / "keys.toml"
+    from support.server import run
+
+    def secret_of(name: str, scope: str) -> str:
+        return run("key", "new", "--name", name, "--scope", scope, "--file", str(keys)).splitlines()[0]
+
+    operator, reader = secret_of("operator", "admin"), secret_of("reader", "read")
+    with serving(tmp_path, "--keys-file", str(keys)) as server:
+        m = mrol.connect(server.address, key=operator).map("a", resolution=0.1, levels=2)
+        m.insert([[1, 0, 0]], align=False)
+        with (
+            mrol_replica.Replica(server.grpc, "a", key=reader) as lasting,
+            mrol_replica.Replica(server.grpc, "a", key=reader, age_max_s=2) as strict,
+        ):
+            lasting.check_age(60)
+            assert not lasting.status.has_ended
+            run("key", "revoke", "--name", "reader", "--file", str(keys))
+            deadline = time.monotonic() + 60
+            while not (lasting.status.has_ended and strict.status.has_ended):
+                assert time.monotonic() < deadline, lasting.status
+                time.sleep(0.05)
+            status = lasting.status
+            assert not status.is_connected
+            assert status.age_s > 0
+            assert status.last_error
+            # One that allows any age answers on and says how old it is; the other one refuses.
+            while strict.status.age_s <= 2:
+                time.sleep(0.05)
+            assert lasting.query([[1, 0, 0]]).occupied.all()
+            with pytest.raises(mrol.Unavailable, match="replica_stale"):
+                lasting.check_age(1)
+            with pytest.raises(mrol.Unavailable, match="age_max is 2s"):
+                strict.query([[1, 0, 0]])
+
+
 def test_threads_ask_beside_each_other(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
     expected = hall.query(POINTS).count
     with ThreadPoolExecutor(8) as threads:

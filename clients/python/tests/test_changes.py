@@ -153,6 +153,12 @@ def test_maps_are_made_described_listed_and_deleted(client: mrol.Client) -> None
         client.map("made", resolution=0.3)
     assert other.value.reason == "map_exists"
     assert client.map("bare", resolution=0.2, filter="none").describe().filter is None
+    surveyed = client.map("surveyed", resolution=0.2, origin=[388096.5, 3948996, 12]).describe()
+    assert surveyed.origin_m is not None
+    assert surveyed.origin_m.tolist() == [388096.5, 3948996.0, 12.0]
+    with pytest.raises(mrol.ArgumentError, match="origin must be 3 finite numbers"):
+        client.map("surveyed", resolution=0.2, origin=[0, np.inf, 0])
+    client.delete_map("surveyed")
     assert {"made", "bare"} <= {of.name for of in client.maps().maps}
     for name in ("made", "bare"):
         client.delete_map(name)

@@ -1,5 +1,6 @@
 """Watches: every kind of change, levels and boxes, and what ends them."""
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -71,6 +72,12 @@ def test_a_watch_goes_on_from_a_version(empty: mrol.Map) -> None:
     assert event.map_uuid == second.map_uuid
     beyond = mrol.Version(first.revision, "00000000-0000-0000-0000-000000000001")
     assert isinstance(next(empty.watch(since=beyond)), mrol.WatchedState)
+    # With another content hash it is what was lost when an older data folder was put back.
+    assert first.version.content_hash is not None
+    lost = dataclasses.replace(first.version, content_hash=first.version.content_hash ^ 1)
+    assert isinstance(next(empty.watch(since=lost)), mrol.WatchedState)
+    with pytest.raises(mrol.ArgumentError, match="since.content_hash"):
+        empty.watch(since=dataclasses.replace(first.version, content_hash=-1))
 
 
 def test_a_watch_of_a_level_and_a_box_tells_those_alone(empty: mrol.Map) -> None:

@@ -52,7 +52,7 @@ export async function send(method, path, body) {
   return response.status === 204 ? undefined : response.json();
 }
 
-/** Blocks of voxels of one level in a box given in cells, and the revision that they are of. */
+/** Blocks of voxels of one level in a box given in cells, and the revision that they are of, with the hash of the map then. */
 export async function readBlocks(map, level, resolution, box, signal) {
   const query = { level };
   if (box) {
@@ -63,7 +63,8 @@ export async function readBlocks(map, level, resolution, box, signal) {
   const headers = { accept: "application/octet-stream" };
   const response = await ask(pathOf(map, "block"), { query, headers, signal });
   const revision = Number(response.headers.get("mrol-revision"));
-  return { revision, uuid: response.headers.get("mrol-map-uuid"), bytes: new Uint8Array(await response.arrayBuffer()) };
+  const [uuid, hash] = ["mrol-map-uuid", "mrol-content-hash"].map((name) => response.headers.get(name));
+  return { revision, uuid, hash, bytes: new Uint8Array(await response.arrayBuffer()) };
 }
 
 /** A name for a change, by which sending it again changes nothing. */

@@ -7,7 +7,10 @@ const FIXED32 = 5;
 
 const utf8 = new TextDecoder();
 
-/** Reads a message field by field: `read[number](value)`, where a value is a number, bytes, or eight bytes as a view. */
+/**
+ * Reads a message field by field: `read[number](value)`, where a value is a number or bytes. Of eight bytes it is the float
+ * that they are, with the bytes behind it.
+ */
 export function readMessage(bytes, read) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   let at = 0;
@@ -22,11 +25,12 @@ export function readMessage(bytes, read) {
   };
   while (at < bytes.length) {
     const tag = varint();
-    let value;
+    let value, eight;
     if ((tag & 7) === VARINT) {
       value = varint();
     } else if ((tag & 7) === FIXED64) {
       value = view.getFloat64(at, true);
+      eight = bytes.subarray(at, at + 8);
       at += 8;
     } else if ((tag & 7) === BYTES) {
       const length = varint();
@@ -38,7 +42,7 @@ export function readMessage(bytes, read) {
     } else {
       throw new Error(`the wire type ${tag & 7} is none of this contract`);
     }
-    read[tag >>> 3]?.(value);
+    read[tag >>> 3]?.(value, eight);
   }
 }
 

@@ -30,8 +30,9 @@ export class Session {
 
   static async open(name, told) {
     const session = new Session(await read(pathOf(name)), told);
-    const { revision, uuid } = await session.loader.readRoots();
+    const { revision, hash, uuid } = await session.loader.readRoots();
     session.revision = revision;
+    session.hash = hash;
     session.uuid = uuid;
     return session;
   }
@@ -39,7 +40,7 @@ export class Session {
   /** Follows the map from what was read of it. */
   follow() {
     const told = this.#told;
-    this.#watch = new Watch(this.name, this.uuid, this.revision, {
+    this.#watch = new Watch(this.name, this.uuid, this, {
       change: (change) => this.#take(change),
       reset: told.reset,
       connected: told.connected,

@@ -14,17 +14,20 @@ export class Watch {
   #map;
   #uuid;
   #revision;
+  /** Of what the whole map holds at that revision, sixteen hexadecimal digits; none where it was not told. */
+  #hash;
   #heard;
   #stop = new AbortController();
 
   /**
-   * Follows a map from a revision on. `heard` has `change`, `reset` (what was told before holds no more), `connected`
+   * Follows a map from a version on: its `revision` and, where it is known, its `hash`. `heard` has `change`, `reset` (what was told before holds no more), `connected`
    * and `lost(problem, retrySeconds)`; without seconds it has ended for good.
    */
-  constructor(map, uuid, revision, heard) {
+  constructor(map, uuid, { revision, hash }, heard) {
     this.#map = map;
     this.#uuid = uuid;
     this.#revision = revision;
+    this.#hash = hash;
     this.#heard = heard;
     this.#follow();
   }
@@ -54,6 +57,8 @@ export class Watch {
 
   async #connect(connected) {
     const query = { delta_level: 0, since_revision: this.#revision, map_uuid: this.#uuid };
+    // With another hash the server has another history than we read, and tells of the whole state.
+    if (this.#hash) query.since_content_hash = this.#hash;
     const silence = new AbortController();
     const signal = AbortSignal.any([this.#stop.signal, silence.signal]);
     const response = await ask(pathOf(this.#map, "watch"), { query, signal });
@@ -88,7 +93,7 @@ export class Watch {
     }
     if (!change) return;
     this.#heard.change(change);
-    if (change.isComplete) this.#revision = change.revision;
+    if (change.isComplete) [this.#revision, this.#hash] = [change.revision, change.hash];
   }
 }
 
@@ -129,6 +134,7 @@ function changeOf(bytes) {
   readMessage(bytes, {
     1: (revision) => (change.revision = revision),
     2: (complete) => (change.isComplete = complete === 1),
+    3: (_, eight) => (change.hash = hexOf(eight)),
     4: (blocks) => (change.removed = blocks),
     5: (blocks) => (change.added = blocks),
     6: (scan) => Object.assign(change, { cause: "scan", scan: scanOf(scan) }),
@@ -137,6 +143,11 @@ function changeOf(bytes) {
     9: () => (change.cause = "keep_out"),
   });
   return change;
+}
+
+/** Eight bytes, little-endian, as the number's hexadecimal digits. */
+function hexOf(bytes) {
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).reverse().join("");
 }
 
 function scanOf(bytes) {

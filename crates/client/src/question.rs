@@ -9,8 +9,8 @@ use crate::wire::pb;
 use mrol_map::map::MapName;
 use mrol_map::planning::{Frontiers, Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
 use mrol_service::{
-    Answered, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion,
-    PoseCheck, RayQuestion, SphereCheck,
+    Answered, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, GridTile, MapVersion,
+    MotionCheck, NearestQuestion, PoseCheck, RayQuestion, Reason, ServiceError, SphereCheck, TILED_CELLS_MAX,
 };
 
 impl Client {
@@ -207,4 +207,62 @@ impl Client {
         let request = self.request((map, grid));
         self.domain(self.connection.occupancy().project_grid(request).await)
     }
+
+    /// The map from above in tiles, each at a revision of its own: of a grid that is too large for one answer, or takes longer
+    /// than one may. [`Client::whole_grid`] joins them.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached; an error among the tiles is the last one.
+    pub async fn grid_tiles(
+        &self,
+        map: &MapName,
+        grid: GridQuestion,
+    ) -> Result<Answers<GridTile>, ClientError> {
+        let request = pb::ProjectGridRequest::from((map, grid));
+        let answers = self.connection.occupancy().stream_grid(request).await;
+        self.connection.answers(answers)
+    }
+
+    /// The map from above, joined of tiles, with the versions of the first tile and of the last: equal where the map did not
+    /// change meanwhile.
+    ///
+    /// # Errors
+    /// When the server refuses, cannot be reached, or sends tiles that make no grid.
+    pub async fn whole_grid(
+        &self,
+        map: &MapName,
+        grid: GridQuestion,
+    ) -> Result<(Grid, [MapVersion; 2]), ClientError> {
+        let mut tiles = self.grid_tiles(map, grid).await?;
+        let mut joined: Option<(Grid, [MapVersion; 2])> = None;
+        let (mut put, mut expected) = (0, 1);
+        while put < expected {
+            let tile =
+                tiles.next().await.unwrap_or_else(|| Err(no_grid("the tiles end before the last one")))?;
+            let GridTile {
+                origin_m,
+                size,
+                tiles: of_all,
+                first,
+                grid: Answered { answer: part, version },
+                ..
+            } = tile;
+            expected = of_all;
+            if size[0].saturating_mul(size[1]) > TILED_CELLS_MAX {
+                return Err(no_grid("there are more cells than a grid may have"));
+            }
+            let empty = || (Grid::empty(part.cell_m, origin_m, size, part.free.is_some()), [version; 2]);
+            let (whole, versions) = joined.get_or_insert_with(empty);
+            if whole.size != size || !whole.put(first, &part) {
+                return Err(no_grid("a tile does not lie in the grid"));
+            }
+            (versions[1], put) = (version, put + 1);
+        }
+        joined.ok_or_else(|| no_grid("there are no tiles"))
+    }
+}
+
+/// Tiles that make no grid.
+fn no_grid(why: &str) -> ClientError {
+    ClientError::Answer(ServiceError::new(Reason::UnexpectedField, why))
 }

@@ -41,8 +41,8 @@ pub use maps::EVENTS_MAX;
 pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};
 pub use question::{
     Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
-    GridQuestion, GridScope, KnownPart, MotionCheck, NearestQuestion, PoseCheck, Question, QuestionedMap,
-    RayQuestion, RaysToward, SphereCheck,
+    GridQuestion, GridScope, GridTile, GridTiles, KnownPart, MotionCheck, NearestQuestion, PoseCheck,
+    Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck, TILED_CELLS_MAX,
 };
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,

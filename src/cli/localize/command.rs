@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::report::Localized;
 use crate::cli::remote::ServerOptions;
 use crate::cli::scan_report::name_of;
+use crate::cli::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
@@ -16,9 +17,9 @@ use mrol_map::align::localize::{
     localize_supervised,
 };
 use mrol_map::geometry::Point;
-use mrol_map::map::{MapName, MultiResolutionMap};
+use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::mapping::MappingError;
-use mrol_map::scan::{PointFilter, SkippedPoints, read_points, scan_files};
+use mrol_map::scan::{PointFilter, SkippedPoints, read_exact_points, scan_files};
 use mrol_map::util::StopSignal;
 use mrol_service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
 use mrol_store::{Disk, Snapshot};
@@ -51,6 +52,8 @@ pub(crate) struct Localize {
     name: Option<MapName>,
     #[command(flatten)]
     server: ServerOptions,
+    #[command(flatten)]
+    survey: SurveyOptions,
     /// Direction of gravity in the sensor frame
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
     gravity: Option<[f64; 3]>,
@@ -82,16 +85,22 @@ impl Localize {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         let (query, time_limit) = (self.query()?, self.time_limit()?);
         let files = scan_files(&self.scans)?;
-        let place = match (&self.map, self.name) {
+        let place = match (&self.map, &self.name) {
             (Some(file), _) => MapSource::open(file)?,
-            (None, Some(name)) => MapSource::Server(self.server.connect().await?, name),
+            (None, Some(name)) => MapSource::Server(self.server.connect().await?, name.clone()),
             (None, None) => return Err(CliError::usage("one of --map and --name is needed")),
+        };
+        let survey = match files.first() {
+            Some(file) => {
+                Some(self.survey.survey(&place.settings().await?, &read_exact_points(file)?, false)?)
+            }
+            None => None,
         };
         let output = output.with_spinner();
         let mut refused = 0;
-        for file in &files {
+        for (file, survey) in files.iter().zip(survey.iter().cycle()) {
             let request = LocalizationRequest {
-                points: read_points(file)?.into(),
+                points: survey.read(file)?.into(),
                 query,
                 time_limit: Some(time_limit),
             };
@@ -135,6 +144,13 @@ impl MapSource {
             content_hash: Some(snapshot.contents.version().hash),
         };
         Ok(Self::File(Box::new(snapshot.restore().map_err(CliError::failed)?), version))
+    }
+
+    async fn settings(&self) -> Result<MapSettings, CliError> {
+        match self {
+            Self::File(map, _) => Ok(*map.settings()),
+            Self::Server(client, name) => Ok(client.map_info(name).await?.settings),
+        }
     }
 
     async fn find(

@@ -18,7 +18,7 @@ pub(super) use list::List;
 pub(super) use object::Object;
 pub(super) use octets::AnswerBytes;
 pub(super) use octets::{
-    BitmapBytes, BlockBytes, MapFileBytes, PointBytes, QuestionBytes, ScanBytes, WatchBytes,
+    BitmapBytes, BlockBytes, GridTileBytes, MapFileBytes, PointBytes, QuestionBytes, ScanBytes, WatchBytes,
 };
 pub(super) use params::pose;
 pub(super) use params::{

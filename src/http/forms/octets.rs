@@ -34,6 +34,7 @@ forms_of_bytes! {
     BlockBytes: "`sparse`: 72 bytes a block of 8 x 8 x 8 voxels, its packed key and a bit a voxel in Morton order. `dense`: \
                  a byte a cell, x fastest, then y.";
     MapFileBytes: "A map file, as `mrol map` and `mrol snapshot` write it.";
+    GridTileBytes: "Tiles, each the protobuf message `mrol.v1.GridTile` behind its length in 4 bytes, little-endian.";
     WatchBytes: "Messages without end, each the protobuf message `mrol.v1.WatchResponse` behind its length in 4 bytes, \
                  little-endian.";
 }

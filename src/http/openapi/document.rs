@@ -56,6 +56,7 @@ use mrol_service::{Reason, ServiceError};
         question::classify::classify_points,
         question::frontiers::list_frontiers,
         question::grid::project_grid,
+        question::grid::stream_grid,
         voxels::list,
         block::get,
         observers::list,

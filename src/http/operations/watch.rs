@@ -1,5 +1,5 @@
-//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`: the changes of
-//! a map.
+//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&since_content_hash=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`:
+//! the changes of a map.
 //!
 //! The answer is a stream of messages, each the protobuf message `WatchResponse` that gRPC sends (`occupancy.proto`) behind
 //! its length in four bytes, little-endian. It ends with a message that says why.
@@ -21,7 +21,8 @@ use crate::http::forms::{Map, Numbers3, Numbers7, Params, RegionParams};
 use crate::http::middleware::Service;
 use mrol_client::wire::{framed, pb};
 use mrol_map::map::MapName;
-use mrol_service::{ServiceError, WatchRequest};
+use mrol_map::util::excerpt;
+use mrol_service::{Reason, ServiceError, WatchRequest};
 
 /// From where on, and of which part.
 #[derive(Deserialize, IntoParams)]
@@ -33,6 +34,8 @@ pub(crate) struct WatchParams {
     /// The map that this was a revision of.
     #[param(format = "uuid")]
     map_uuid: Option<String>,
+    /// The map's content hash at that revision, as the client was told: where the map had another, the whole state comes first.
+    since_content_hash: Option<String>,
     /// Tell of the voxels of this level that came and went; without, of the finest as they were recorded.
     delta_level: Option<u32>,
     /// Smallest coordinates `x,y,z` of a box along the map's axes, meters; together with `max`.
@@ -80,6 +83,17 @@ pub(crate) async fn watch(
     Ok((content_type, Body::from_stream(messages)).into_response())
 }
 
+/// A content hash as answers in JSON tell it.
+fn hash_of(digits: &str) -> Result<u64, ServiceError> {
+    let refused = || {
+        let message =
+            format!("since_content_hash must have sixteen hexadecimal digits, got {:?}", excerpt(digits));
+        ServiceError::new(Reason::BadQuery, message)
+    };
+    let are_digits = digits.len() == 16 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    are_digits.then(|| u64::from_str_radix(digits, 16).ok()).flatten().ok_or_else(refused)
+}
+
 impl WatchParams {
     fn request(self, map: &MapName) -> Result<WatchRequest, ServiceError> {
         let Self { min, max, map_from_box, size, .. } = self;
@@ -91,6 +105,7 @@ impl WatchParams {
             region: region.map(Into::into),
             delta_level: self.delta_level,
             viewpoints: self.viewpoints,
+            since_content_hash: self.since_content_hash.as_deref().map(hash_of).transpose()?,
         };
         let (_, request) = request.try_into()?;
         Ok(request)

@@ -1,21 +1,31 @@
-//! `POST /v1/maps/{map}/grid`: the map from above, as a 2-D grid.
+//! `POST /v1/maps/{map}/grid`: the map from above, as a 2-D grid; `/grid/tiles`: a large one in tiles.
+//!
+//! Tiles are a stream of messages, each the protobuf message `GridTile` that gRPC sends (`planning.proto`) behind its length in
+//! four bytes, little-endian. Where they end early the last message says why.
 
-use axum::body::Bytes;
-use axum::response::Response;
+use std::convert::Infallible;
+
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
+use tokio_stream::StreamExt;
 use utoipa::ToSchema;
 
 use super::answer::{Answer, Array};
 use super::asked::asked;
 use super::form::QuestionBody;
+use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
 use crate::http::forms::Map;
 use crate::http::forms::Object;
-use crate::http::forms::{AnswerBytes, QuestionBytes};
+use crate::http::forms::{AnswerBytes, GridTileBytes, QuestionBytes};
 use crate::http::middleware::Service;
 use crate::json::{JsonVersion, Sizes2, Vector2};
-use mrol_client::wire::pb;
-use mrol_service::GridQuestion;
+use mrol_client::wire::{framed, pb};
+use mrol_map::map::MapName;
+use mrol_service::{GridQuestion, ServiceError};
 
 /// Which part of the map is seen from above.
 #[derive(Deserialize, ToSchema)]
@@ -95,6 +105,18 @@ struct GridResponse {
     version: JsonVersion,
 }
 
+impl GridBody {
+    fn into_message(self, map: &MapName) -> pb::ProjectGridRequest {
+        let area =
+            self.area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
+                pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
+            });
+        let asked = asked(map, (self.level, self.ignore_keep_outs), self.min_revision, self.map_uuid);
+        let Self { min_z_m, max_z_m, cell_m, tell_unknown, .. } = self;
+        pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m, tell_unknown }
+    }
+}
+
 /// Projects the map from above to a 2-D grid.
 #[utoipa::path(
     post,
@@ -112,15 +134,7 @@ pub(in crate::http) async fn project_grid(
     asking: QuestionBody<GridBody>,
 ) -> Result<Response, HttpError> {
     let form = asking.form;
-    let message = move |of: GridBody, _: &Bytes| {
-        let area =
-            of.area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
-                pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
-            });
-        let asked = asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid);
-        let GridBody { min_z_m, max_z_m, cell_m, tell_unknown, .. } = of;
-        Ok(pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m, tell_unknown })
-    };
+    let message = move |of: GridBody, _: &Bytes| Ok(of.into_message(&map));
     let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
     let answered = service.ask(&map, question).await?;
     let version = answered.version;
@@ -139,4 +153,31 @@ pub(in crate::http) async fn project_grid(
     ];
     arrays.extend(response.free.map(|free| ("free", Array::Bits(free, cells))));
     Answer { head, version, arrays }.respond(form, &service).await
+}
+
+/// Projects the map from above to a 2-D grid that comes in tiles, each at a revision of its own.
+///
+/// For grids that are too large for one answer, or take longer than one may. Where the tiles end before the last one, which
+/// is known by their number, the last message says why.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/grid/tiles",
+    request_body(content((GridBody = "application/json"), (QuestionBytes = "application/octet-stream"))),
+    responses((status = 200, description = "Tiles", body = GridTileBytes, content_type = "application/octet-stream"))
+)]
+pub(in crate::http) async fn stream_grid(
+    State(adapter): State<Adapter>,
+    Service(service): Service,
+    Map(map): Map,
+    asking: QuestionBody<GridBody>,
+) -> Result<Response, HttpError> {
+    let message = move |of: GridBody, _: &Bytes| Ok(of.into_message(&map));
+    let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
+    let tiles = service.grid_tiles(&map, question).await?.into_stream(adapter.admission.told_to_drain());
+    let tiles = tiles.map(|tile| {
+        let failure = |error: ServiceError| pb::GridTile::from(pb::Failure::from(error));
+        Ok::<_, Infallible>(framed(&tile.map_or_else(failure, Into::into)))
+    });
+    let content_type = [(header::CONTENT_TYPE, "application/octet-stream")];
+    Ok((content_type, Body::from_stream(tiles)).into_response())
 }

@@ -43,7 +43,7 @@ fn body(operation: Operation) -> Body {
         Operation::FindNearest => Body::Json(json!({"points": row(1), "radius_m": 1})),
         Operation::ClassifyPoints => Body::Json(json!({"points": row(1)})),
         Operation::ListFrontiers => Body::Json(json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}})),
-        Operation::ProjectGrid => Body::Json(json!({})),
+        Operation::ProjectGrid | Operation::StreamGrid => Body::Json(json!({})),
         Operation::Undo => Body::Json(json!({"revision": 1})),
         Operation::PutKeepOut => Body::Json(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Body::Json(json!({"resolution_m": 0.1})),

@@ -20,7 +20,7 @@ async fn who_watches_is_told_of_keep_outs_in_both_forms_and_from_the_journal() {
     client.delete_keep_out(&map("a"), removal).await.unwrap();
     let map_uuid = client.map_info(&map("a")).await.unwrap().version.map_uuid;
     // The ring has room for none of them: what came since is read from the journal.
-    let since = Some(WatchedSince { revision: 1, map_uuid });
+    let since = Some(WatchedSince { revision: 1, map_uuid, content_hash: None });
     let mut told = client.watch(&map("a"), WatchRequest { since, ..WatchRequest::default() }).await.unwrap();
     let mut causes = Vec::new();
     while causes.len() < 3 {

@@ -5,6 +5,7 @@ mod keep_outs;
 mod part_of_a_map;
 mod refused;
 mod streams;
+mod tiles;
 mod unknown;
 mod versions;
 

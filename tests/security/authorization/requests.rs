@@ -63,7 +63,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             let r#box = Some(pb::Box { min_m: corner(0.0), max_m: corner(1.0) });
             pb::ListFrontiersRequest { asked: asked(map), r#box, ..Default::default() }.encode_to_vec()
         }
-        Operation::ProjectGrid => {
+        Operation::ProjectGrid | Operation::StreamGrid => {
             pb::ProjectGridRequest { asked: asked(map), ..Default::default() }.encode_to_vec()
         }
         Operation::ListKeepOuts => pb::ListKeepOutsRequest { map }.encode_to_vec(),
@@ -170,7 +170,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         Operation::FindNearest => Some(json!({"points": POINTS, "radius_m": 1})),
         Operation::ClassifyPoints => Some(json!({"points": POINTS})),
         Operation::ListFrontiers => Some(json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}})),
-        Operation::ProjectGrid => Some(json!({})),
+        Operation::ProjectGrid | Operation::StreamGrid => Some(json!({})),
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
@@ -198,6 +198,7 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::ClassifyPointsStream
         | Operation::ListFrontiers
         | Operation::ProjectGrid
+        | Operation::StreamGrid
         | Operation::ListKeepOuts
         | Operation::PutKeepOut
         | Operation::DeleteKeepOut

@@ -41,6 +41,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::ClassifyPointsStream
         | Operation::ListFrontiers
         | Operation::ProjectGrid
+        | Operation::StreamGrid
         | Operation::GetBlock
         | Operation::ListObservers
         | Operation::Watch

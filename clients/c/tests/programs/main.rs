@@ -16,7 +16,7 @@ use mrol_client::geometry::{Point, Pose};
 use mrol_client::map::{KeepOutName, KeepOutShape, Lookup, MapName, Region, RobotName};
 use mrol_client::mapping::Guess;
 use mrol_client::service::{PointQuery, PutKeepOut, ScanRequest};
-use mrol_client::{Client, NewMap};
+use mrol_client::{Client, Credentials, NewMap};
 
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -100,11 +100,16 @@ impl Server {
     }
 
     fn start_at(data: PathBuf, address: &str) -> Self {
+        Self::start_with(data, address, &[])
+    }
+
+    fn start_with(data: PathBuf, address: &str, options: &[&str]) -> Self {
         let program = std::env::var_os("MROL_PROGRAM").map_or_else(|| built().join("mrol"), PathBuf::from);
         let mut process = Command::new(program)
             .args(["serve", "--json", "--log-level", "error", "--http-listen", "127.0.0.1:0"])
             .args(["--grpc-listen", address, "--data-dir"])
             .arg(&data)
+            .args(options)
             .env("MROL_LOG__AUDIT", "false")
             .stdout(Stdio::piped())
             .spawn()
@@ -327,6 +332,53 @@ async fn a_copy_of_a_region_refuses_what_lies_outside() {
     assert_eq!([revision, hash, asked, positive, bits], ["1", "-", "2", "1", "01"]);
     let outside = driver.told("query 0 0 0 - 2 0.55 0.05 0.05 1.55 0.05 0.05");
     assert!(outside.starts_with("MROL_INVALID_ARGUMENT point_out_of_range: points[1]"), "{outside}");
+    driver.end();
+}
+
+/// Changes the keys of a file, by the server's program; what it prints.
+fn change_keys(arguments: &[&str], file: &Path) -> String {
+    let program = std::env::var_os("MROL_PROGRAM").map_or_else(|| built().join("mrol"), PathBuf::from);
+    let output = Command::new(program).arg("key").args(arguments).arg("--file").arg(file).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_replica_whose_key_is_revoked_says_so_gives_up_and_answers_up_to_the_age_allowed() {
+    let data = folder("revoked");
+    let keys = data.join("keys.toml");
+    let operator = change_keys(&["new", "--name", "operator", "--scope", "admin"], &keys);
+    let reader = change_keys(&["new", "--name", "reader", "--scope", "read"], &keys);
+    let options = ["--keys-file", keys.to_str().unwrap()];
+    let server = Server::start_with(data.clone(), "127.0.0.1:0", &options);
+    let credentials = Credentials::default().with_key(&operator).unwrap();
+    let client = Client::connect_with(&server.grpc, &credentials).await.unwrap();
+    make_map(&client).await;
+    insert(&client, row(3)).await;
+    let mut driver = Driver::start("driver.c", Linked::Dynamically);
+    driver.does(&format!("open_with_key {} a {reader} 1000000", server.grpc));
+    assert!(driver.told("status").contains("connected=1 ended=0 young"));
+    driver.does("check_age 60000");
+    change_keys(&["revoke", "--name", "reader"], &keys);
+    // It is refused a few times, and asks no more.
+    let status = driver.until("status", |line| line.contains("connected=0 ended=1"));
+    assert!(status.contains("bad_key") || status.contains("key"), "{status}");
+    let point = "query 0 0 0 - 1 0.05 0.05 0.05";
+    assert!(driver.told(point).ends_with(" 1 1 01"));
+    let refused = driver.told("check_age 1");
+    assert!(refused.starts_with("MROL_STALE replica_stale: the server was heard"), "{refused}");
+    // Another one answers nothing that is older than its options allow.
+    let writer = change_keys(&["new", "--name", "other", "--scope", "read"], &keys);
+    let mut strict = Driver::start("driver.c", Linked::Dynamically);
+    let begin = Instant::now();
+    while strict.told(&format!("open_with_key {} a {writer} 1500", server.grpc)) != "ok" {
+        assert!(begin.elapsed() < PATIENCE, "the new key is not known");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    drop(server);
+    let refused = strict.until(point, |line| line.starts_with("MROL_STALE"));
+    assert!(refused.contains("replica_stale") && refused.contains("age_max is 1.5s"), "{refused}");
+    strict.end();
     driver.end();
 }
 

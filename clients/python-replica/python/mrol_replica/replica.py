@@ -32,6 +32,11 @@ class ReplicaStatus:
     """How often all of it was copied."""
     last_error: "str | None"
     """Why the last watch ended, where it did."""
+    age_s: float
+    """How long ago the server was heard last, seconds. It says something at least every `watch_heartbeat_s`: an older copy may lack
+    changes, even while `is_connected` is true."""
+    has_ended: bool
+    """Whether the replica follows no longer, since the server refused its key several times in a row: the copy stays as it is."""
 
 
 class Replica(Questions):
@@ -42,7 +47,8 @@ class Replica(Questions):
     and not shown: `key` is the caller's secret. `region` copies the voxels of a box alone, and then questions are refused that what
     lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each block of 8 x 8 x 8 voxels). With
     `bloom` it has filters, without `viewpoints` it does not know what is free. Where the connection breaks it comes back by itself;
-    `status` tells.
+    `status` tells. With `age_max_s`, more than the server's `watch_heartbeat_s`, questions raise `Unavailable` (`replica_stale`)
+    where the server was heard longer ago; without, answers may be of any age.
 
     Raises `ConnectFailed`, `NotFound` (`map_not_found`), `Unauthenticated`, `PermissionDenied`, `TimedOut`.
     """
@@ -62,6 +68,7 @@ class Replica(Questions):
         blocks_max: "int | None" = None,
         bloom: bool = False,
         viewpoints: bool = True,
+        age_max_s: "float | None" = None,
     ) -> None:
         given = _address_of(address)
         if (certificate is None) != (private_key is None):
@@ -80,6 +87,7 @@ class Replica(Questions):
             blocks_max=None if blocks_max is None else whole_of(blocks_max, "blocks_max", 1),
             bloom=flag_of(bloom, "bloom"),
             viewpoints=flag_of(viewpoints, "viewpoints"),
+            age_max_s=None if age_max_s is None else seconds_of(age_max_s, "age_max_s"),
         )
         super().__init__(opened)
         self._opened = opened
@@ -88,13 +96,20 @@ class Replica(Questions):
     @property
     def status(self) -> ReplicaStatus:
         """How far it is."""
-        version, head_revision, is_connected, resets, last_error = self._opened.status()
-        return ReplicaStatus(version_of(version), head_revision, is_connected, resets, last_error)
+        version, head_revision, is_connected, resets, last_error, age_s, has_ended = self._opened.status()
+        return ReplicaStatus(version_of(version), head_revision, is_connected, resets, last_error, age_s, has_ended)
 
     @property
     def revision(self) -> int:
         """The revision of the copy."""
         return self.status.version.revision
+
+    def check_age(self, age_max_s: float) -> None:
+        """Refuses a copy whose server was heard longer ago, before a question whose answer must not be older.
+
+        Raises `Unavailable` (`replica_stale`).
+        """
+        self._opened.check_age(seconds_of(age_max_s, "age_max_s"))
 
     def wait_for_revision(self, revision: int, timeout_s: float = 10.0) -> None:
         """Waits until the copy has a revision, that of a change which was acknowledged for example.

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal
 
-from ._arrays import number_of, seconds_of, whole_of
+from numpy.typing import ArrayLike
+
+from ._arrays import number_of, seconds_of, vector_of, whole_of
 from ._fields import Fields, fields_of, reading
 from ._files import File
 from ._sessions import Sessions
@@ -84,19 +86,21 @@ class Client:
         levels: int | None = None,
         filter: FilterSettings | Literal["none"] | None = None,
         moments: bool | None = None,
+        origin: ArrayLike | None = None,
         robot: str = ROBOT,
     ) -> Map:
         """A map: with a `resolution` (the side of a voxel, meters) it is made where it is not there; without, it has to be there.
 
         `levels` (6) halve the resolution each; `filter="none"` and `moments=False` are for maps that are only queried. `robot`
-        is the name in which scans are sent: give each robot one of its own.
+        is the name in which scans are sent: give each robot one of its own. `origin` x y z, meters, says where the map's origin
+        lies in the coordinates of a survey: subtract it, in float64, from points before they are sent. It is kept with the map.
 
         Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: it is there with other settings), `InvalidArgument`
         (`bad_settings`, `bad_name`).
         """
         found = Map(self._caller, name, robot, self._sessions)
         if resolution is None:
-            if levels is not None or filter is not None or moments is not None:
+            if any(of is not None for of in (levels, filter, moments, origin)):
                 raise ArgumentError("resolution", "None with other settings", "given where a map is to be made")
             found.describe()
             return found
@@ -105,6 +109,7 @@ class Client:
             "levels": None if levels is None else whole_of(levels, "levels", 0, (1 << 32) - 1),
             "filter": _filter_json(filter),
             "moments": None if moments is None else flag_of(moments, "moments"),
+            "origin_m": None if origin is None else vector_of(origin, 3, "origin", is_finite=True),
         }
         given = json.dumps({key: value for key, value in settings.items() if value is not None}).encode()
         self._caller.call(Request("PUT", path_of("v1", "maps", found.name), JSON, [given]))

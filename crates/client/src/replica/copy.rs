@@ -15,7 +15,9 @@ use mrol_map::map::{
 use mrol_map::planning::Planner;
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Viewpoint, ViewpointSet};
 use mrol_map::voxel::{BlockMask, VoxelKey, VoxelSet};
-use mrol_service::{Cause, ChangePart, LeftViewpoint, StatePart, WatchEvent, WatchMessage, WatchedViewpoint};
+use mrol_service::{
+    Cause, ChangePart, LeftViewpoint, StatePart, WatchEvent, WatchMessage, WatchedSince, WatchedViewpoint,
+};
 
 /// A map as a replica has it.
 #[derive(Debug, Clone)]
@@ -50,6 +52,8 @@ pub(super) struct Builder {
     /// True of a copy of the whole map, whose hash can be compared.
     is_whole: bool,
     copied: Option<Copied>,
+    /// The hash of what the whole map holds at the copy's revision, where the server told it.
+    map_hash: Option<ContentHash>,
     state: Option<StateSoFar>,
     change: Option<ChangeSoFar>,
 }
@@ -75,11 +79,28 @@ impl Builder {
     /// Nothing is copied yet.
     pub(super) fn new(options: &ReplicaOptions) -> Self {
         let ReplicaOptions { region, blocks_max, viewpoint_bytes_max, filter, .. } = *options;
-        let is_whole = region.is_none();
-        Self { blocks_max, viewpoint_bytes_max, filter, is_whole, copied: None, state: None, change: None }
+        Self {
+            blocks_max,
+            viewpoint_bytes_max,
+            filter,
+            is_whole: region.is_none(),
+            copied: None,
+            map_hash: None,
+            state: None,
+            change: None,
+        }
+    }
+
+    /// What the copy has, for a server to go on from.
+    pub(super) fn since(&self) -> Option<WatchedSince> {
+        let Copied { map, map_uuid, .. } = self.copied.as_ref()?;
+        let ContentVersion { revision, hash } = map.content_version();
+        let content_hash = if self.is_whole { Some(hash) } else { self.map_hash };
+        Some(WatchedSince { revision, map_uuid: *map_uuid, content_hash })
     }
 
     /// What was copied last.
+    #[cfg(test)]
     pub(super) fn copied(&self) -> Option<&Copied> {
         self.copied.as_ref()
     }
@@ -135,14 +156,17 @@ impl Builder {
         };
         let StateSoFar { map_uuid, settings, version, blocks, keep_outs, viewpoints } = state;
         let voxels: VoxelSet = blocks.into_iter().collect();
-        self.check_hash(ContentHash::of(&voxels), Some(version.hash))?;
+        let hash = ContentHash::of(&voxels);
+        if self.is_whole && hash != version.hash {
+            return Err(damaged(format!("the state's hash is {hash}, and the map's {}", version.hash)));
+        }
         let (revision, viewpoints) = (version.revision, Arc::new(viewpoints));
         let contents = MapContents { revision, voxels, keep_outs, viewpoints, ..MapContents::default() };
         let contents = contents.checked().map_err(|e| damaged(e.to_string()))?;
         let map = MultiResolutionMap::restore(settings, contents);
         let map = Arc::new(map.map_err(|e| damaged(format!("the map's settings: {e}")))?);
         let copied = Copied { map, map_uuid, planner: Arc::default() };
-        self.copied = Some(copied.clone());
+        (self.copied, self.map_hash) = (Some(copied.clone()), Some(version.hash));
         Ok(Applied::Replaced(copied))
     }
 
@@ -183,7 +207,8 @@ impl Builder {
             }
             Cause::Deletion => map.committer().exchange(&removed, &added),
         };
-        self.check_hash(committed.hash, part.content_hash)?;
+        self.check_same(committed.version(), part.content_hash)?;
+        self.map_hash = part.content_hash;
         Ok(Applied::Changed)
     }
 
@@ -203,10 +228,12 @@ impl Builder {
         Ok(ViewpointChange { left, gone })
     }
 
-    fn check_hash(&self, own: ContentHash, told: Option<ContentHash>) -> Result<(), ReplicaError> {
-        match told.filter(|told| self.is_whole && *told != own) {
+    /// Refuses to go on with a copy that is another than the map at the same revision.
+    fn check_same(&self, own: ContentVersion, told: Option<ContentHash>) -> Result<(), ReplicaError> {
+        let ContentVersion { revision, hash: copy } = own;
+        match told.filter(|told| self.is_whole && *told != copy) {
             None => Ok(()),
-            Some(told) => Err(damaged(format!("the copy's hash is {own}, and the map's {told}"))),
+            Some(map) => Err(ReplicaError::Diverged { revision, copy, map }),
         }
     }
 }

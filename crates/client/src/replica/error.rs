@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::error::ClientError;
+use mrol_map::map::ContentHash;
 use mrol_service::ServiceError;
 
 /// Why a replica fails.
@@ -14,6 +15,20 @@ pub enum ReplicaError {
     /// What the server sent makes no sense.
     #[error("the server's messages are damaged: {0}")]
     Damaged(String),
+    /// The copy holds other voxels than the map at the same revision, as after an older data folder was put back. It is copied
+    /// anew.
+    #[error(
+        "the copy differs from the map at revision {revision}: its content hash is {copy}, the map's {map}; the server goes on \
+         from an older data folder than the copy was made of. The whole map is copied again"
+    )]
+    Diverged {
+        /// The revision of both.
+        revision: u64,
+        /// The content hash of the copy.
+        copy: ContentHash,
+        /// The content hash of the map, as the server told it.
+        map: ContentHash,
+    },
     /// The server sent nothing for so long, not even a heartbeat.
     #[error("the server was silent for {0:?}, silence_max of the replica")]
     Silent(Duration),

@@ -17,7 +17,7 @@ use crate::answers::Answers;
 use crate::client::Client;
 use crate::error::ClientError;
 use mrol_map::map::MapName;
-use mrol_service::{WatchForm, WatchMessage, WatchRequest, WatchedSince};
+use mrol_service::{WatchForm, WatchMessage, WatchRequest};
 
 /// Shortest and longest pause before the server is asked again, less a random part of up to a half.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -52,11 +52,9 @@ impl Follower {
 
     /// Watches the map from the last revision of the copy on.
     async fn watch(&mut self) -> Result<Answers<WatchMessage>, ClientError> {
-        let builder = self.builder.as_mut();
-        let since = builder.and_then(|builder| {
+        let since = self.builder.as_mut().and_then(|builder| {
             builder.begin();
-            let copied = builder.copied()?;
-            Some(WatchedSince { revision: copied.map.revision(), map_uuid: copied.map_uuid })
+            builder.since()
         });
         let request = WatchRequest {
             since,

@@ -18,9 +18,7 @@ use mrol_map::map::{
 };
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep, ViewpointSet};
 use mrol_map::voxel::VoxelKey;
-use mrol_service::{
-    MapService, ServiceSettings, Watch, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedSince,
-};
+use mrol_service::{MapService, ServiceSettings, Watch, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 use mrol_store::{OpeningProgress, StoreSettings};
 
 /// How long a thread may hold the folder of a service that ended.
@@ -55,10 +53,7 @@ impl Follower {
     /// Goes on from where the copy is.
     async fn begin(&mut self, service: &MapService) {
         self.builder.begin();
-        let since = self
-            .builder
-            .copied()
-            .map(|copied| WatchedSince { revision: copied.map.revision(), map_uuid: copied.map_uuid });
+        let since = self.builder.since();
         let (region, viewpoints) = (self.options.region, self.options.viewpoint_bytes_max > 0);
         let request = WatchRequest { since, region, form: WatchForm::Changes, viewpoints };
         self.watch = Some(service.watch(&map(), request).await.unwrap());

@@ -14,10 +14,12 @@ impl TryFrom<pb::WatchRequest> for (MapName, WatchRequest) {
     type Error = ServiceError;
 
     fn try_from(request: pb::WatchRequest) -> Result<Self, ServiceError> {
+        let content_hash = request.since_content_hash.map(ContentHash::from_bits);
         let since = match (request.since_revision, request.map_uuid.is_empty()) {
+            (None, true) if content_hash.is_some() => return Err(half_a_version("since_content_hash")),
             (None, true) => None,
             (Some(revision), false) => {
-                Some(WatchedSince { revision, map_uuid: uuid_from(&request.map_uuid)? })
+                Some(WatchedSince { revision, map_uuid: uuid_from(&request.map_uuid)?, content_hash })
             }
             (Some(_), true) => return Err(half_a_version("since_revision")),
             (None, false) => return Err(half_a_version("map_uuid")),
@@ -32,7 +34,7 @@ impl TryFrom<pb::WatchRequest> for (MapName, WatchRequest) {
 }
 
 fn half_a_version(got: &str) -> ServiceError {
-    let message = format!("since_revision and map_uuid go together, got {got} alone");
+    let message = format!("since_revision and map_uuid go together, got {got} without both");
     ServiceError::new(Reason::MissingField, message)
 }
 
@@ -49,6 +51,7 @@ impl From<(&MapName, WatchRequest)> for pb::WatchRequest {
                 WatchForm::Deltas { level } => Some(level),
             },
             viewpoints,
+            since_content_hash: since.and_then(|since| since.content_hash).map(ContentHash::to_bits),
         }
     }
 }
@@ -231,12 +234,12 @@ impl TryFrom<pb::WatchedScan> for WatchedScan {
     }
 }
 
-/// A message of a watch as HTTP sends it: its length in four bytes, little-endian, then the message.
-pub fn framed(message: &pb::WatchResponse) -> Bytes {
-    let length = prost::Message::encoded_len(message);
+/// A message of a stream as HTTP sends it: its length in four bytes, little-endian, then the message.
+pub fn framed(message: &impl prost::Message) -> Bytes {
+    let length = message.encoded_len();
     let mut frame = BytesMut::with_capacity(size_of::<u32>() + length);
     frame.put_u32_le(u32::try_from(length).unwrap_or(u32::MAX));
     // There is room for it.
-    let _ = prost::Message::encode(message, &mut frame);
+    let _ = message.encode(&mut frame);
     frame.freeze()
 }

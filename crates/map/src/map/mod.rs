@@ -22,6 +22,7 @@
 mod change;
 mod commit;
 mod content_hash;
+mod content_history;
 mod contents;
 mod distance_block;
 mod info;
@@ -46,6 +47,7 @@ pub use change::{
 };
 pub use commit::{Committer, ViewpointChange};
 pub use content_hash::{ContentHash, ContentVersion};
+pub use content_history::ContentHistory;
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use distance_block::{DISTANCE_CAP_MAX, DistanceBlock, margin_of};
 pub use info::{FilterInfo, LevelInfo, MapDescription};

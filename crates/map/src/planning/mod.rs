@@ -36,7 +36,7 @@ pub use frontiers::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, FrontierView, Frontiers,
     STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,
 };
-pub use grid::{Grid, GridArea, GridError, GridRequest, project_grid};
+pub use grid::{Grid, GridArea, GridError, GridExtent, GridRequest, grid_extent, project_grid};
 pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
 pub use planner::{Planner, PlanningView};
 pub use rays::{DIRECTION_LENGTH_TOLERANCE, RayError, RayHits, Rays, Toward, cast_rays, cast_rays_in_sight};

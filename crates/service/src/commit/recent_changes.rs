@@ -8,7 +8,7 @@ use tokio::sync::watch;
 
 use super::watched_change::WatchedChange;
 use crate::request::WatchForm;
-use mrol_map::map::LevelSet;
+use mrol_map::map::{ContentHash, ContentHistory, ContentVersion, LevelSet};
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::voxel::LEVELS_MAX;
 
@@ -31,6 +31,8 @@ struct Ring {
     bytes: usize,
     /// The map's revision.
     head: u64,
+    /// The content hashes of the last revisions, of more than there are changes of.
+    history: ContentHistory,
 }
 
 /// Keeps a level among those that are watched.
@@ -42,8 +44,8 @@ pub(crate) struct WatchedLevel {
 
 impl RecentChanges {
     /// Those of a map at `revision`, which is durable, in at most `bytes_max` bytes.
-    pub(crate) fn new(revision: u64, bytes_max: usize) -> Self {
-        let ring = Ring { changes: VecDeque::new(), bytes: 0, head: revision };
+    pub(crate) fn new(revision: u64, history: ContentHistory, bytes_max: usize) -> Self {
+        let ring = Ring { changes: VecDeque::new(), bytes: 0, head: revision, history };
         Self {
             ring: Mutex::new(Rank::Brief, ring),
             bytes_max,
@@ -64,6 +66,9 @@ impl RecentChanges {
         let mut gone = Vec::new();
         let mut ring = self.ring.lock();
         (ring.head, ring.bytes) = (change.revision, ring.bytes + change.memory_bytes());
+        if let Some(hash) = change.hash {
+            ring.history.push(ContentVersion { revision: change.revision, hash });
+        }
         ring.changes.push_back(Arc::new(change));
         while ring.bytes > self.bytes_max {
             let Some(oldest) = ring.changes.pop_front() else { break };
@@ -86,6 +91,16 @@ impl RecentChanges {
     /// Follows the last revision that is durable.
     pub(crate) fn durable(&self) -> watch::Receiver<u64> {
         self.durable.subscribe()
+    }
+
+    /// The content hashes of the last revisions.
+    pub(crate) fn history(&self) -> ContentHistory {
+        self.ring.lock().history.clone()
+    }
+
+    /// The content hash at `revision`; none where it is not known.
+    pub(crate) fn hash_at(&self, revision: u64) -> Option<ContentHash> {
+        self.ring.lock().history.get(revision)
     }
 
     /// The change that made `revision`, if it is still here.

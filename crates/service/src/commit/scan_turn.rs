@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use crate::commit::watched_change::WatchedChange;
     use mrol_map::geometry::{Point, Pose};
-    use mrol_map::map::{DeletionRecord, MapSettings, MappedScan, RobotName};
+    use mrol_map::map::{ContentHistory, ContentVersion, DeletionRecord, MapSettings, MappedScan, RobotName};
     use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
     use mrol_map::voxel::VoxelKey;
 
@@ -126,7 +126,8 @@ mod tests {
     /// A map to which these changes were made, and what of them so many bytes remember.
     fn map_of(changes: &[Change], recent_bytes: usize) -> (MultiResolutionMap, Arc<RecentChanges>) {
         let map = MultiResolutionMap::new(MapSettings::new(0.1, 2)).unwrap();
-        let recent = Arc::new(RecentChanges::new(0, recent_bytes));
+        let recent =
+            Arc::new(RecentChanges::new(0, ContentHistory::of(ContentVersion::default()), recent_bytes));
         for change in changes {
             let committed = map.committer().apply(change);
             recent.push(WatchedChange::of(committed.revision, None, change.clone(), Vec::new()));

@@ -27,7 +27,7 @@ pub(crate) struct Watched {
 #[derive(Debug)]
 pub(crate) struct WatchedChange {
     pub(crate) revision: u64,
-    hash: Option<ContentHash>,
+    pub(crate) hash: Option<ContentHash>,
     cause: Cause,
     viewpoint: Option<ToldViewpoint>,
     finest: Exchanged,

@@ -169,7 +169,7 @@ reasons! {
         BlockTooLarge "block_too_large" Both: "a block exceeds `block_bytes_max`, or with what lies around it `block_cells_max`", "ask for a smaller part, a coarser level or a smaller `cap_m`";
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";
         FrontierBoxTooLarge "frontier_box_too_large" Both: "a box of more than `frontier_cells_max` voxels", "ask for a smaller box or a coarser level";
-        GridTooLarge "grid_too_large" Both: "a grid of more than `grid_cells_max` cells, or of more than a message holds", "ask for a smaller area or larger cells";
+        GridTooLarge "grid_too_large" Both: "a grid of more than `grid_cells_max` cells, or of more than a message holds; in tiles, of more than 268,435,456", "ask for it in tiles, for a smaller area or larger cells";
         ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";
         MapFull "map_full" Both: "the map would exceed `voxels_per_map_max`; a restored file also `map_file_scans_max`, `robots_per_map_max` or `viewpoint_bytes_max`", "make the map coarser, or raise the limit";

@@ -99,7 +99,9 @@ pub struct Limits {
     pub question_time_max_s: f64,
     /// Time of a question that is answered in parts, seconds: each part takes `question_time_max_s` at most.
     pub long_question_time_max_s: f64,
-    /// Cells of one 2-D grid. 4,000,000.
+    /// How long a grid that is drawn in tiles may take in all, its client's reading with it. 60 s.
+    pub grid_time_max_s: f64,
+    /// Cells of one 2-D grid that is answered as a whole. 4,000,000.
     pub grid_cells_max: usize,
     /// Voxels of a box in which frontiers are looked for. 4,000,000.
     pub frontier_cells_max: usize,
@@ -207,6 +209,7 @@ impl Default for Limits {
             planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
             question_time_max_s: 0.5,
             long_question_time_max_s: 10.0,
+            grid_time_max_s: 60.0,
             grid_cells_max: 4_000_000,
             frontier_cells_max: 4_000_000,
             frontiers_max: 1000,

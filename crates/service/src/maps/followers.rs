@@ -7,6 +7,7 @@ use tokio::sync::watch;
 
 use super::full_state::FullStates;
 use crate::commit::{CommitQueue, Published, RecentChanges};
+use mrol_map::map::ContentHistory;
 
 /// Everything that the followers of a map read.
 #[derive(Debug)]
@@ -20,10 +21,10 @@ pub(crate) struct Followers {
 }
 
 impl Followers {
-    /// Those of a map at `revision`, of whose changes so many bytes are kept, and where its thread publishes to them.
-    pub(super) fn new(revision: u64, watch_bytes_max: usize) -> (Self, Published) {
+    /// Those of a map at `revision` with this history, of whose changes so many bytes are kept, and where its thread publishes to them.
+    pub(super) fn new(revision: u64, history: ContentHistory, watch_bytes_max: usize) -> (Self, Published) {
         let (announcing, announced) = watch::channel(revision);
-        let recent = Arc::new(RecentChanges::new(revision, watch_bytes_max));
+        let recent = Arc::new(RecentChanges::new(revision, history, watch_bytes_max));
         let published = Published { announced: announcing, recent: Arc::clone(&recent) };
         (Self { announced, recent, whole_states: FullStates::default() }, published)
     }

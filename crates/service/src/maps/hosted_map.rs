@@ -13,10 +13,10 @@ use crate::commit::{CommitQueue, CommitThread, Stop};
 use crate::error::{Reason, ServiceError};
 use crate::request::{MapInfo, MapStorage, MapVersion};
 use crate::work::ended_early;
-use mrol_map::map::{ContentVersion, MapName, MultiResolutionMap};
+use mrol_map::map::{ContentHistory, ContentVersion, MapName, MultiResolutionMap};
 use mrol_map::planning::Planner;
 use mrol_map::util::StopSignal;
-use mrol_store::{FolderUse, MapFolder, StoreError, StoreSettings};
+use mrol_store::{FolderUse, MapFolder, OpenedMap, StoreError, StoreSettings};
 
 /// A named map and who waits for it.
 #[derive(Debug)]
@@ -50,12 +50,27 @@ impl HostedMap {
         folder: Option<MapFolder>,
         settings: &StoreSettings,
     ) -> Self {
-        Self::of_shared(thread, name, uuid, map.into(), folder.map(Arc::new), settings)
+        let map = map.into();
+        let history = ContentHistory::of(map.content_version());
+        Self::of_shared(thread, name, uuid, map, history, folder.map(Arc::new), settings)
+    }
+
+    /// Takes a map into service that was opened; `thread` makes its changes.
+    pub(super) fn opened(
+        thread: CommitThread,
+        name: MapName,
+        opened: OpenedMap,
+        settings: &StoreSettings,
+    ) -> Self {
+        let OpenedMap { uuid, map, history, folder, .. } = opened;
+        Self::of_shared(thread, name, uuid, Arc::new(map), history, Some(Arc::new(folder)), settings)
     }
 
     /// This map under the name `name`, once it has ended under its own.
     pub(super) fn again_as(&self, thread: CommitThread, name: MapName, settings: &StoreSettings) -> Self {
-        Self::of_shared(thread, name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
+        let (map, folder) = (Arc::clone(&self.map), self.folder.clone());
+        let history = self.followers.recent.history();
+        Self::of_shared(thread, name, self.uuid, map, history, folder, settings)
     }
 
     fn of_shared(
@@ -63,10 +78,11 @@ impl HostedMap {
         name: MapName,
         uuid: Uuid,
         map: Arc<MultiResolutionMap>,
+        history: ContentHistory,
         folder: Option<Arc<MapFolder>>,
         settings: &StoreSettings,
     ) -> Self {
-        let (followers, published) = Followers::new(map.revision(), settings.watch_bytes_max);
+        let (followers, published) = Followers::new(map.revision(), history, settings.watch_bytes_max);
         let commit_queue =
             CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), published, settings);
         Self {

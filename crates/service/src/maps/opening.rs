@@ -35,8 +35,7 @@ pub(super) fn open_all(
                 // The snapshot was written before what went when it was there.
                 thin(&opened.map, &opened.folder);
                 let thread = CommitThread::start(&name)?;
-                let OpenedMap { uuid, map, folder, .. } = opened;
-                let map = HostedMap::new(thread, name.clone(), uuid, map, Some(folder), settings);
+                let map = HostedMap::opened(thread, name.clone(), opened, settings);
                 maps.open.insert(name, Arc::new(map));
             }
             Err(error @ StoreError::Cancelled) => return Err(not_stored(error)),

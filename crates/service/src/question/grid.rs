@@ -9,6 +9,7 @@ use crate::limits::Limits;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
 use mrol_map::util::StopSignal;
+use mrol_map::voxel::Lattice;
 
 /// What is the map from above?
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,13 @@ impl GridQuestion {
     fn cells_max(limits: &Limits) -> usize {
         limits.grid_cells_max.min(limits.message_bytes_max / BYTES_EACH)
     }
+
+    /// What is to be drawn of a map with this lattice, in at most so many cells.
+    pub(super) fn request(&self, lattice: &Lattice, cells_max: usize) -> GridRequest {
+        let (GridScope { area, band_m, cell_m, tells_unknown }, level) = (self.scope, self.asked.level);
+        let cell_m = cell_m.unwrap_or_else(|| lattice.resolution_m(level));
+        GridRequest { level, area, band_m, cell_m, tells_unknown, cells_max }
+    }
 }
 
 impl Question for GridQuestion {
@@ -73,12 +81,8 @@ impl Question for GridQuestion {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Grid, ContentVersion), ServiceError> {
-        let GridScope { area, band_m, cell_m, tells_unknown } = self.scope;
-        let level = self.asked.level;
         map.in_view(&self.asked, usize::MAX, stop, |view| {
-            let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
-            let cells_max = Self::cells_max(limits);
-            let request = GridRequest { level, area, band_m, cell_m, tells_unknown, cells_max };
+            let request = self.request(view.lattice(), Self::cells_max(limits));
             Ok(project_grid(view, &request, stop)?)
         })
     }
@@ -103,7 +107,9 @@ impl From<GridError> for ServiceError {
     fn from(error: GridError) -> Self {
         match error {
             GridError::Cells { .. } => {
-                let message = format!("grid_cells_max: {error}: ask for a smaller area or larger cells");
+                let message = format!(
+                    "grid_cells_max: {error}: ask for a smaller area or larger cells, or for the grid in tiles"
+                );
                 Self::new(Reason::GridTooLarge, message)
             }
             GridError::BandRange { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),

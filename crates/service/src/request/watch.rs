@@ -31,6 +31,10 @@ pub struct WatchedSince {
     pub revision: u64,
     /// The map that this is a revision of.
     pub map_uuid: Uuid,
+    /// The content hash that the map had at that revision, as the caller was told. Where the map had another, or none that
+    /// is known, the whole state comes first: an older data folder was put back, and the caller has what was lost. Without
+    /// it, the revision alone is believed.
+    pub content_hash: Option<ContentHash>,
 }
 
 /// In which form changes are told.
@@ -118,8 +122,8 @@ pub struct ChangePart {
     pub revision: u64,
     /// True of the last part of the change.
     pub is_last: bool,
-    /// Hash of what the whole map holds after the change, where it is known: a change that is read from the journal has
-    /// none.
+    /// Hash of what the whole map holds after the change, where it is known: a change from before the
+    /// snapshot that the map was opened from has none.
     pub content_hash: Option<ContentHash>,
     /// What made the change.
     pub cause: Cause,

@@ -16,6 +16,11 @@ pub(crate) trait Teller: Send + 'static {
 
     /// The next message, once there is one. After an error comes no other.
     fn tell(&mut self) -> impl Future<Output = Result<Self::Message, ServiceError>> + Send;
+
+    /// True of a message after which none comes.
+    fn is_last(_: &Self::Message) -> bool {
+        false
+    }
 }
 
 /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where
@@ -38,7 +43,7 @@ pub(crate) fn stream_of<T: Teller>(
                 reason = &mut end => Err(reason),
                 message = teller.tell() => message,
             };
-            let is_last = message.is_err();
+            let is_last = message.as_ref().map_or(true, T::is_last);
             let sent = tokio::time::timeout(patience, outbox.send(message)).await;
             if is_last || !matches!(sent, Ok(Ok(()))) {
                 return;
@@ -51,7 +56,7 @@ pub(crate) fn stream_of<T: Teller>(
     let mut has_ended = false;
     ReceiverStream::new(messages).chain(tokio_stream::once(Err(stalled))).map_while(move |message| {
         let message = (!has_ended).then_some(message)?;
-        has_ended = message.is_err();
+        has_ended = message.as_ref().map_or(true, T::is_last);
         Some(message)
     })
 }

@@ -14,7 +14,7 @@ use crate::error::ServiceError;
 use crate::map_service::MapService;
 use crate::maps::HostedMap;
 use crate::observer::Outcome;
-use crate::request::{WatchEvent, WatchForm, WatchMessage, WatchRequest};
+use crate::request::{WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedSince};
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 
@@ -83,8 +83,12 @@ impl Watch {
         };
         let durable = map.followers.recent.durable();
         let head = *durable.borrow();
-        // A revision that is not there, or of another map, is out of reach.
-        let told = since.filter(|since| since.map_uuid == map.uuid && since.revision <= head);
+        // A revision that is not there, of another map, or of another history of this one, is out of reach.
+        let is_here = |since: &WatchedSince| {
+            let is_same = |hash| map.followers.recent.hash_at(since.revision) == Some(hash);
+            since.map_uuid == map.uuid && since.revision <= head && since.content_hash.is_none_or(is_same)
+        };
+        let told = since.filter(is_here);
         let told = told.map(|since| since.revision);
         let (parts, read) = (Parts::Nothing, VecDeque::new());
         let watched = Watched { form, region, viewpoints };
@@ -148,6 +152,7 @@ impl Watch {
         self.read.clear();
         let folder = self.map.folder.clone().filter(|_| self.watched.form == WatchForm::Changes);
         let (Some(folder), head) = (folder, *self.durable.borrow()) else { return Ok(()) };
+        let recent = Arc::clone(&self.map.followers.recent);
         let read = move |stop: StopSignal<'_>| {
             let (mut batch, mut bytes) = (VecDeque::new(), 0);
             // What is removed meanwhile is out of reach as well.
@@ -156,7 +161,7 @@ impl Watch {
                 if revision > head || stop.is_stopped() {
                     break;
                 }
-                let change = WatchedChange::of(revision, None, change, Vec::new());
+                let change = WatchedChange::of(revision, recent.hash_at(revision), change, Vec::new());
                 bytes += change.memory_bytes();
                 batch.push_back(Arc::new(change));
                 if batch.len() >= BATCH_MAX || bytes >= BATCH_BYTES {

@@ -150,6 +150,18 @@ impl DataDir {
         Ok(self.maps.join(&replacement.kept))
     }
 
+    /// Sets a map file aside under a name of its own, as it is; returns where it lies then.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub(crate) fn set_file_aside(&self, name: &MapName) -> Result<PathBuf, StoreError> {
+        let file = self.maps.join(Entry::file_name(name));
+        let aside = self.maps.join(Entry::set_aside_name(&Entry::folder_name(name, Uuid::new_v4())));
+        let renamed = self.files.rename(&file, &aside).and_then(|()| self.files.sync(&self.maps));
+        renamed.map_err(StoreError::io(&file))?;
+        Ok(aside)
+    }
+
     /// Deletes a map. When this returns, the map is deleted for good, though its bytes may not all be freed.
     ///
     /// # Errors

@@ -9,4 +9,4 @@ mod tests;
 
 pub use diagnose::{diagnose, diagnose_file};
 pub use diagnosis::{AsideFile, Diagnosis};
-pub use set_aside::{SetAside, set_aside};
+pub use set_aside::{SetAside, set_aside, set_file_aside};

@@ -14,6 +14,7 @@ use crate::file_system::FileSystem;
 use crate::progress::OpeningProgress;
 use crate::snapshots::Snapshot;
 use mrol_map::map::{MapName, MultiResolutionMap};
+use mrol_map::util::StopSignal;
 
 /// Result of [`set_aside`].
 #[derive(Debug)]
@@ -57,6 +58,22 @@ pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>,
     let (revision, keep_outs) = (first.contents.revision, first.contents.keep_outs.len());
     let viewpoints = first.contents.viewpoints.len();
     Ok(Some(SetAside { folder, revision, keep_outs, viewpoints }))
+}
+
+/// Sets a map file aside that no server takes in, of the first format for example: it is renamed, as it is. Nothing of a damaged
+/// one can be read, so that no map is made. None where there is no such file, or it can be taken in.
+///
+/// # Errors
+/// When the system refuses.
+pub fn set_file_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<PathBuf>, StoreError> {
+    if !data_dir.file_names()?.contains(name) {
+        return Ok(None);
+    }
+    match data_dir.read_file(name, StopSignal::NEVER) {
+        Ok(_) => Ok(None),
+        Err(error @ StoreError::Io { .. }) => Err(error),
+        Err(_) => data_dir.set_file_aside(name).map(Some),
+    }
 }
 
 /// The map that a folder still gives: that of the newest snapshot, and the changes after it up to what cannot be read.

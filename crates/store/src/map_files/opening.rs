@@ -17,7 +17,7 @@ use crate::progress::OpeningProgress;
 use crate::settings::StoreSettings;
 use crate::snapshots::Snapshot;
 use crate::viewpoint_parts::{self, ViewpointParts};
-use mrol_map::map::{Change, KEEP_OUTS_MAX, KeepOutRecord, MultiResolutionMap};
+use mrol_map::map::{Change, ContentHistory, KEEP_OUTS_MAX, KeepOutRecord, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 
 /// A map that was opened.
@@ -29,6 +29,8 @@ pub struct OpenedMap {
     pub uuid: Uuid,
     /// The map at the revision of the last durable change.
     pub map: MultiResolutionMap,
+    /// The content hashes of the snapshot's revision and of those after it.
+    pub history: ContentHistory,
     /// Revision of the snapshot that it was read from.
     pub snapshot: u64,
     /// Result of reading the journal after the snapshot.
@@ -96,6 +98,7 @@ impl MapFolder {
             .map_err(|e| StoreError::damaged(&path, e.to_string()))?
             .ok_or(StoreError::Cancelled)?;
         let levels = map.settings().levels;
+        let mut history = ContentHistory::of(map.content_version());
         let replay = |revision, change| {
             // What a snapshot may not hold, no change may bring in.
             if let Change::Insertion(scan) = &change {
@@ -106,6 +109,7 @@ impl MapFolder {
             }
             let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);
+            history.push(committed.version());
             (committed.revision == revision).then_some(()).ok_or(made)
         };
         let known = Known { snapshot: revision, durable: last_written.max(head) };
@@ -132,6 +136,7 @@ impl MapFolder {
             folder,
             uuid,
             map,
+            history,
             snapshot: revision,
             recovered,
             damaged,

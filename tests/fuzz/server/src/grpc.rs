@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 32] = [
+const METHODS: [&str; 33] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -37,6 +37,7 @@ const METHODS: [&str; 32] = [
     "Occupancy/CastRays",
     "Occupancy/FindNearest",
     "Occupancy/ProjectGrid",
+    "Occupancy/StreamGrid",
     "Occupancy/ClassifyPoints",
     "Occupancy/ListFrontiers",
     "Mapping/ListEvents",

@@ -54,7 +54,9 @@ class WatchOperations(MapHandle):
         First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
         change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
         where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
-        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. `box` leaves other
+        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The content hash of
+        `since` goes along: where the map had another one at that revision, since an older data folder was put back, a
+        `WatchedState` comes first. `box` leaves other
         voxels out. With `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of
         the state; what it raises ends the watch.
 
@@ -72,6 +74,8 @@ class WatchOperations(MapHandle):
                 raise ArgumentError("since", excerpt(since), "a Version, or an answer with one")
             whole_of(version.revision, "since.revision")
             word_of(version.map_uuid, "since.map_uuid")
+            if version.content_hash is not None:
+                whole_of(version.content_hash, "since.content_hash")
         wants_heartbeats = flag_of(heartbeats, "heartbeats")
         silent_s = seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
@@ -91,13 +95,23 @@ class WatchOperations(MapHandle):
 
         with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect)) as events:
             for event in events:
-                version = event.version
+                # A heartbeat has no hash: that of the revision that it confirms still holds.
+                if not (isinstance(event, Heartbeat) and version is not None and _is_at(event.version, version)):
+                    version = event.version
                 if heartbeats or not isinstance(event, Heartbeat):
                     yield event
 
 
+def _is_at(one: Version, other: Version) -> bool:
+    return (one.revision, one.map_uuid) == (other.revision, other.map_uuid)
+
+
 def _since(version: Version | None) -> dict[str, Parameter]:
-    return {} if version is None else {"since_revision": version.revision, "map_uuid": version.map_uuid}
+    if version is None:
+        return {}
+    content_hash = None if version.content_hash is None else f"{version.content_hash:016x}"
+    since: dict[str, Parameter] = {"since_revision": version.revision, "map_uuid": version.map_uuid}
+    return since | {"since_content_hash": content_hash}
 
 
 def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:

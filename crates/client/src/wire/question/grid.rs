@@ -2,10 +2,10 @@
 
 use super::asked::{Of, answered, asked_of};
 use crate::wire::pb;
-use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, words_of};
+use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, required, words_of};
 use mrol_map::map::MapName;
 use mrol_map::planning::{Grid, GridArea};
-use mrol_service::{Answered, GridQuestion, GridScope, ServiceError};
+use mrol_service::{Answered, GridQuestion, GridScope, GridTile, Reason, ServiceError};
 
 impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
     type Error = ServiceError;
@@ -80,5 +80,50 @@ impl TryFrom<pb::ProjectGridResponse> for Answered<Grid> {
             free: response.free.map(|free| words_of(&free, cells, "free")).transpose()?,
         };
         answered(grid, response.version)
+    }
+}
+
+impl From<GridTile> for pb::GridTile {
+    fn from(tile: GridTile) -> Self {
+        let GridTile { origin_m: [origin_x_m, origin_y_m], size, tiles, first, grid, .. } = tile;
+        let ([cells_x, cells_y], [first_x, first_y]) =
+            (size.map(|cells| cells as u64), first.map(|cell| cell as u64));
+        Self {
+            origin_x_m,
+            origin_y_m,
+            cells_x,
+            cells_y,
+            tiles: tiles as u64,
+            first_x,
+            first_y,
+            grid: Some(grid.into()),
+            failure: None,
+        }
+    }
+}
+
+/// The last message of tiles over HTTP that end early.
+impl From<pb::Failure> for pb::GridTile {
+    fn from(failure: pb::Failure) -> Self {
+        Self { failure: Some(failure), ..Self::default() }
+    }
+}
+
+/// A tile alone does not know whether it is the last one: who reads them counts.
+impl TryFrom<pb::GridTile> for GridTile {
+    type Error = ServiceError;
+
+    fn try_from(tile: pb::GridTile) -> Result<Self, ServiceError> {
+        if let Some(failure) = tile.failure {
+            return Err(ServiceError::new(Reason::UnexpectedField, failure.message));
+        }
+        Ok(Self {
+            origin_m: [tile.origin_x_m, tile.origin_y_m],
+            size: [tile.cells_x, tile.cells_y].map(count_from),
+            tiles: count_from(tile.tiles),
+            first: [tile.first_x, tile.first_y].map(count_from),
+            is_last: false,
+            grid: required(tile.grid, "grid")?.try_into()?,
+        })
     }
 }

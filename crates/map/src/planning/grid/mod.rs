@@ -2,6 +2,7 @@
 //! high it reaches.
 
 mod cells;
+mod extent;
 mod free;
 mod keep_outs;
 mod map_server;
@@ -12,6 +13,7 @@ mod request;
 #[cfg(test)]
 mod tests;
 
+pub use extent::{GridExtent, grid_extent};
 pub use occupancy_grid::Grid;
 pub use project::project_grid;
 pub use request::{GridArea, GridError, GridRequest};

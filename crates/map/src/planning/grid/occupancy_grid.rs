@@ -22,6 +22,35 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// A grid of `size` cells without anything in them; where `tells_unknown`, all of them unknown.
+    pub fn empty(cell_m: f64, origin_m: [f64; 2], size: [usize; 2], tells_unknown: bool) -> Self {
+        let cells = size[0] * size[1];
+        let none = || vec![0; cells.div_ceil(64)];
+        let free = tells_unknown.then(none);
+        Self { cell_m, origin_m, size, occupied: none(), tops_m: vec![f32::NAN; cells], free }
+    }
+
+    /// Puts a part of this grid in, whose first cell is the cell `first` of this one; false where it does not lie within,
+    /// and nothing is put in.
+    pub fn put(&mut self, first: [usize; 2], part: &Self) -> bool {
+        let fits =
+            |axis: usize| first[axis].checked_add(part.size[axis]).is_some_and(|end| end <= self.size[axis]);
+        if !(fits(0) && fits(1)) {
+            return false;
+        }
+        let bit = |words: &[u64], number: usize| words[number / 64] >> (number % 64) & 1;
+        for (y, x) in (0..part.size[1]).flat_map(|y| (0..part.size[0]).map(move |x| (y, x))) {
+            let from = y * part.size[0] + x;
+            let to = (first[1] + y) * self.size[0] + first[0] + x;
+            self.tops_m[to] = part.tops_m[from];
+            self.occupied[to / 64] |= bit(&part.occupied, from) << (to % 64);
+            if let (Some(free), Some(is_free)) = (&mut self.free, &part.free) {
+                free[to / 64] |= bit(is_free, from) << (to % 64);
+            }
+        }
+        true
+    }
+
     /// Number of cells.
     pub fn cells(&self) -> usize {
         self.tops_m.len()

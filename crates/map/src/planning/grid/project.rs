@@ -35,14 +35,7 @@ pub fn project_grid(
     stop: StopSignal<'_>,
 ) -> Result<Grid, GridError> {
     let projection = Projection::of(view, request)?;
-    let cells = match request.area {
-        GridArea::Rectangle { min_m, max_m } => Cells::of_rectangle(min_m, max_m, projection.cell_m),
-        GridArea::Occupied => projection.occupied_cells(stop),
-    };
-    let count = cells.size(0) as f64 * cells.size(1) as f64;
-    if count > request.cells_max as f64 {
-        return Err(GridError::Cells { cells: count, cell_m: projection.cell_m, most: request.cells_max });
-    }
+    let cells = cells_of(&projection, request, stop)?;
     let mut grid = projection.grid(&cells, stop);
     if let Some(shapes) = Shapes::of(view) {
         keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
@@ -51,4 +44,21 @@ pub fn project_grid(
         grid.free = Some(projection.free_cells(&cells, &grid, stop));
     }
     Ok(grid)
+}
+
+/// The cells of the grid that is asked for.
+pub(super) fn cells_of(
+    projection: &Projection<'_>,
+    request: &GridRequest,
+    stop: StopSignal<'_>,
+) -> Result<Cells, GridError> {
+    let cells = match request.area {
+        GridArea::Rectangle { min_m, max_m } => Cells::of_rectangle(min_m, max_m, projection.cell_m),
+        GridArea::Occupied => projection.occupied_cells(stop),
+    };
+    let count = cells.size(0) as f64 * cells.size(1) as f64;
+    if count > request.cells_max as f64 {
+        return Err(GridError::Cells { cells: count, cell_m: projection.cell_m, most: request.cells_max });
+    }
+    Ok(cells)
 }
