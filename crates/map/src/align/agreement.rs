@@ -78,6 +78,9 @@ impl RayCounts {
     }
 }
 
+/// Points that are contradicted by chance: at a pose that is as good none may be, and four at another, two deviations of their number.
+const CHANCE: f64 = 4.0;
+
 impl RayAgreement {
     /// The smaller share of both sides.
     pub fn worse(&self) -> f64 {
@@ -90,10 +93,10 @@ impl RayAgreement {
     }
 
     /// How many times as much is contradicted at another pose, of the side of which that is more: people contradict one side wherever
-    /// the scan is put. One point more or less is chance.
+    /// the scan is put. As many points as counts vary by, two deviations where none is contradicted here, are chance.
     pub(super) fn contrast(&self, there: &Self) -> f64 {
         let of = |here: RayCounts, there: RayCounts| {
-            (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64
+            (there.contradicted as f64 + CHANCE) / (here.contradicted as f64 + CHANCE)
         };
         of(self.of_scan, there.of_scan).max(of(self.of_map, there.of_map))
     }

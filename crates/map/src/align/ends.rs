@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::agreement::{RayAgreement, Rays, Rival};
-use super::elsewhere::other_yaws;
+use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
@@ -29,7 +28,7 @@ const AGREEMENT_MIN: f64 = 0.9;
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
-/// How many times as much rays have to contradict a pose that is told from an end.
+/// How many times as much rays have to contradict a pose that is told from an end, or how many times as little to agree with it.
 const CONTRAST_MIN: f64 = 2.0;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
@@ -113,6 +112,18 @@ impl<'a> Ends<'a> {
         }
     }
 
+    /// Asks further witnesses of ends of which those of the first ones cannot speak: on another floor they saw nothing.
+    pub(super) fn hear_further_witnesses(&mut self, map: &MultiResolutionMap) {
+        let unseen = self.all.iter().filter(|end| !has_evidence(&end.agreement));
+        let poses: Vec<Pose> = unseen.map(|end| end.alignment.map_from_sensor).collect();
+        if self.stop.is_stopped() || poses.is_empty() {
+            return;
+        }
+        self.witnesses.add(self.rays, map, &poses, self.stop);
+        let ends = std::mem::take(&mut self.all);
+        self.all = ends.into_iter().map(|end| self.end(end.alignment)).collect();
+    }
+
     /// Leaves open which way the robot was turned.
     pub(super) fn open_yaw(&mut self) {
         self.prior = self.prior.map(PosePrior::with_open_yaw);
@@ -186,7 +197,7 @@ impl<'a> Ends<'a> {
     }
 
     /// The rivals of `best`, other poses that may be the true one: ends elsewhere whose cost is little more; ends that rays clearly prefer,
-    /// since what is known beforehand may be too sure of itself; and [the guess](Self::rivals_at_guess).
+    /// since what is known beforehand may be too sure of itself; and [the guess](Self::rival_at_guess).
     ///
     /// An end with an open direction is not believed, but it is possible.
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
@@ -201,48 +212,38 @@ impl<'a> Ends<'a> {
         let ends = ends.filter(|end| is_elsewhere(&end.alignment.map_from_sensor)).filter(is_as_likely);
         let of_end =
             |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
-        ends.map(of_end).chain(self.rivals_at_guess(best, preferred)).collect()
+        ends.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
     }
 
-    /// The guess, where the scan would show new ground there, or where `best` is farther from it than guesses are off; and where the robot
-    /// may have been turned unseen, what the guess looks like turned, if the scan would show new ground and rays clearly prefer that.
+    /// The guess, where the scan would show new ground there, or where `best` is farther from it than guesses are off.
     ///
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
-    fn rivals_at_guess(&self, best: &End, preferred: &End) -> Vec<Rival> {
-        let Some(prior) = self.prior else { return Vec::new() };
-        let (own, resolution_m) = (best.cost(preferred), self.resolution_m);
-        let look_at = |pose: Pose| {
-            let is_elsewhere = !is_same_place(&pose, &best.alignment.map_from_sensor, resolution_m);
-            is_elsewhere.then(|| (pose, Look::of(self.rays, &pose, &self.witnesses, self.stop)))
-        };
-        let rival = |(map_from_sensor, look): &(Pose, Look)| Rival {
-            map_from_sensor: *map_from_sensor,
-            agreement: look.agreement(),
-        };
+    fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {
+        let map_from_sensor = self.prior?.guess;
+        if is_same_place(&map_from_sensor, &best.alignment.map_from_sensor, self.resolution_m) {
+            return None;
+        }
+        let look = Look::of(self.rays, &map_from_sensor, &self.witnesses, self.stop);
+        let agreement = look.agreement();
         let is_far = best.deviations * best.deviations > RIVAL;
-        let guess = look_at(prior.guess).filter(|(_, look)| {
-            let agreement = look.agreement();
-            let is_possible = is_hardly_contradicted(&agreement) && (is_far || !has_evidence(&agreement));
-            is_possible && cost(0.0, look, &preferred.look) - own <= RIVAL
-        });
-        // Of fewer contradictions none is clear.
-        let RayAgreement { of_scan, of_map } = best.agreement;
-        let may_have_turned =
-            prior.leaves_yaw_open() && (of_scan.contradicted + of_map.contradicted) as f64 >= RIVAL;
-        let turned = may_have_turned.then(|| other_yaws(&prior.guess)).into_iter().flatten();
-        let turned = turned.filter_map(look_at).filter(|(_, look)| {
-            let agreement = look.agreement();
-            let is_new_ground = is_hardly_contradicted(&agreement) && !has_evidence(&agreement);
-            is_new_ground && best.look.contradicted_more_than(look) >= RIVAL.sqrt()
-        });
-        guess.into_iter().chain(turned).map(|found| rival(&found)).collect()
+        let is_possible = is_hardly_contradicted(&agreement) && (is_far || !has_evidence(&agreement));
+        let is_as_likely = cost(0.0, &look, &preferred.look) - best.cost(preferred) <= RIVAL;
+        (is_possible && is_as_likely).then_some(Rival { map_from_sensor, agreement })
     }
 
-    /// True of a pose that rays contradict clearly more than an end: several times as much, and not by chance.
+    /// True of a pose that rays tell clearly from an end: they agree with half as many points there, or contradict several times as many.
     pub(super) fn is_clearly_worse(&self, pose: &Pose, end: &End) -> bool {
-        let look = Look::of(self.rays, pose, &self.witnesses, self.stop);
-        end.agreement.contrast(&look.agreement()) >= CONTRAST_MIN
-            && look.contradicted_more_than_by_chance(&end.look) >= RIVAL.sqrt()
+        let (here, there) = (&end.agreement, self.agreement_at(pose));
+        let is_lost =
+            |here: RayCounts, there: RayCounts| there.agree as f64 * CONTRAST_MIN <= here.agree as f64;
+        here.contrast(&there) >= CONTRAST_MIN
+            || is_lost(here.of_scan, there.of_scan)
+            || is_lost(here.of_map, there.of_map)
+    }
+
+    /// How rays agree at some other pose.
+    fn agreement_at(&self, pose: &Pose) -> RayAgreement {
+        Look::of(self.rays, pose, &self.witnesses, self.stop).agreement()
     }
 
     /// The share of what each witness met that another one contradicts.

@@ -51,12 +51,6 @@ impl Look {
     /// between two poses that are equal in truth: z = (a - b) / sqrt(a + b) / [`CLUSTERING`], of the points that contradict here
     /// alone (a) and there alone (b).
     pub(super) fn contradicted_more_than(&self, other: &Self) -> f64 {
-        self.contradicted_more_than_by_chance(other) / CLUSTERING
-    }
-
-    /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of counts. Whoever stands
-    /// in view contradicts a pose as much as one a little aside, so points that are met together do not matter there.
-    pub(super) fn contradicted_more_than_by_chance(&self, other: &Self) -> f64 {
         let pairs = self.of_scan.iter().zip(&other.of_scan).chain(self.of_map.iter().zip(&other.of_map));
         let (here, there) = pairs.fold((0.0, 0.0), |(here, there), (a, b)| {
             match (*a == Sight::Contradicts, *b == Sight::Contradicts) {
@@ -65,7 +59,7 @@ impl Look {
                 _ => (here, there),
             }
         });
-        if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) }
+        if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) / CLUSTERING }
     }
 }
 

@@ -58,6 +58,7 @@ impl Contest<'_> {
             let ascent = climb(self.map, self.scan, guess, coarsest, self.settings);
             ends.add(finish(self.map, self.scan, ascent, self.settings));
         }
+        ends.hear_further_witnesses(self.map);
         self.judged(&ends)
     }
 

@@ -47,17 +47,28 @@ impl Witnesses {
     /// The witnesses of a scan that was taken at one of some poses: for each, of the viewpoints near to it those that saw most of
     /// what the scan shows there.
     pub(super) fn of(rays: &Rays, map: &MultiResolutionMap, poses: &[Pose], stop: StopSignal<'_>) -> Self {
-        let mut viewpoints: Vec<Arc<Viewpoint>> = Vec::new();
+        let mut witnesses = Self { viewpoints: Vec::new(), met: Vec::new() };
+        witnesses.add(rays, map, poses, stop);
+        witnesses
+    }
+
+    /// Adds those of further poses.
+    pub(super) fn add(
+        &mut self,
+        rays: &Rays,
+        map: &MultiResolutionMap,
+        poses: &[Pose],
+        stop: StopSignal<'_>,
+    ) {
         for pose in poses {
             let wish = VIEWPOINTS.div_ceil(poses.len()).max(VIEWPOINTS_OF_POSE);
             for viewpoint in viewpoints_for(rays, map, pose, wish, stop) {
-                if !viewpoints.iter().any(|other| Arc::ptr_eq(other, &viewpoint)) {
-                    viewpoints.push(viewpoint);
+                if !self.viewpoints.iter().any(|other| Arc::ptr_eq(other, &viewpoint)) {
+                    self.viewpoints.push(viewpoint);
                 }
             }
         }
-        let met = met(map, &viewpoints, rays.tolerance_m);
-        Self { viewpoints, met }
+        self.met = met(map, &self.viewpoints, rays.tolerance_m);
     }
 
     /// The share of what each witness met that another one contradicts, of what it says anything of: what moved, and what images are

@@ -201,9 +201,9 @@ impl<'a> ScanMapper<'a> {
         let (map_from_sensor, moved_m) = (&alignment.map_from_sensor, scan.moved_m(velocity));
         let from_guess_m = pose_difference(&located.guess, map_from_sensor).0;
         let is_needed = located.is_first || from_guess_m > FAR_M;
-        let is_standing = self.is_standing(scan, map_from_sensor);
+        let is_stationary = self.is_stationary(scan, map_from_sensor);
         let (points, beyond) = (&points, &beyond);
-        let seen = SeenScan { points, beyond, map_from_sensor, moved_m, is_needed, is_standing };
+        let seen = SeenScan { points, beyond, map_from_sensor, moved_m, is_needed, is_stationary };
         record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
@@ -212,7 +212,7 @@ impl<'a> ScanMapper<'a> {
     }
 
     /// True of a scan that was taken where its robot's last one was that is in the map.
-    fn is_standing(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> bool {
+    fn is_stationary(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> bool {
         let settings = self.settings.stationary.unwrap_or_default();
         let trajectory = self.map.trajectory();
         let last = trajectory.last_of(scan.robot);

@@ -79,7 +79,7 @@ pub(super) struct SeenScan<'a> {
     /// It was found far from its guess, or is the map's first: the scans after it are judged by what it saw.
     pub(super) is_needed: bool,
     /// Its robot's last one was taken there, too.
-    pub(super) is_standing: bool,
+    pub(super) is_stationary: bool,
 }
 
 impl ViewpointSettings {
@@ -102,7 +102,7 @@ impl ViewpointSettings {
         let sweep = Sweep { range_max_m: self.range_max_m, moved_m: moved_m as f32, open_m };
         let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
         let least = match is_known_pose {
-            true if scan.is_standing => Least::Space(self.newly_seen_standing_m3),
+            true if scan.is_stationary => Least::Space(self.newly_seen_standing_m3),
             true => Least::Share(self.unknown_from_known_pose),
             false if scan.is_needed => Least::Share(0.0),
             false => Least::Share(self.unknown_from_new_pose),
@@ -275,7 +275,14 @@ mod tests {
     }
 
     fn standing<'a>(points: &'a [Point], map_from_sensor: &'a Pose) -> SeenScan<'a> {
-        SeenScan { points, beyond: &[], map_from_sensor, moved_m: 0.0, is_needed: false, is_standing: false }
+        SeenScan {
+            points,
+            beyond: &[],
+            map_from_sensor,
+            moved_m: 0.0,
+            is_needed: false,
+            is_stationary: false,
+        }
     }
 
     /// Drives through the room and back; the viewpoints, and how many there were after each scan.
