@@ -1,0 +1,129 @@
+//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled where rays cannot tell.
+
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+use mrol_map::geometry::{Point, Pose, pose_difference};
+use mrol_map::map::{MapSettings, MultiResolutionMap, RobotName};
+use mrol_map::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol_map::util::StopSignal;
+use mrol_simulate::{Scene, SpinningLidar};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const RESOLUTION_M: f64 = 0.1;
+
+struct Mapped {
+    map: MultiResolutionMap,
+    sightings: Sightings,
+    robot: RobotName,
+}
+
+impl Mapped {
+    fn new() -> Self {
+        let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, 5)).unwrap();
+        Self { map, sightings: Sightings::default(), robot: RobotName::new("r").unwrap() }
+    }
+
+    fn mapper(&self) -> ScanMapper<'_> {
+        ScanMapper::new(&self.map, &self.sightings, MappingSettings::default())
+    }
+
+    fn add(&self, points: &[Point], map_from_sensor: Pose) {
+        let guess = Guess::Pose(map_from_sensor);
+        let scan = Scan { guess, at_guess: true, ..Scan::new(&self.robot, points) };
+        assert!(self.mapper().map_scan(&scan, StopSignal::NEVER).unwrap().is_inserted());
+    }
+
+    /// Aligns a scan from a guess. It may be refused; accepted it has to be where it was taken.
+    fn assert_not_misled(&self, points: &[Point], guess: Guess, truth: &Pose) {
+        let scan = Scan { guess, ..Scan::new(&self.robot, points) };
+        let found = self.mapper().locate(&scan, StopSignal::NEVER).unwrap().alignment;
+        let (meters, degrees) = pose_difference(&found.map_from_sensor, truth);
+        let is_right = meters < 2.0 * RESOLUTION_M && degrees < 2.0;
+        let was = format!("accepted {meters:.2} m {degrees:.1} deg off: {}", found.reason);
+        assert!(is_right || found.verdict != mrol_map::align::Verdict::Accepted, "{was}");
+    }
+}
+
+fn finite(points: Vec<Point>) -> Vec<Point> {
+    points.into_iter().filter(|point| point.is_finite()).collect()
+}
+
+fn at(x: f64, y: f64, z: f64, yaw: f64) -> Pose {
+    Pose::new(Vector3::new(x, y, z), Vector3::z() * yaw)
+}
+
+/// A scan of 16 rings in a corridor along x without an end, of a sensor 1 m above its floor.
+fn corridor(width_m: f64, map_from_sensor: &Pose, random: &mut ChaCha8Rng) -> Vec<Point> {
+    let mut points = Vec::new();
+    for ring in 0..16 {
+        let elevation = (f64::from(ring) * 2.0 - 15.0).to_radians();
+        for azimuth in 0..900 {
+            let (sin, cos) = (f64::from(azimuth) * 0.4).to_radians().sin_cos();
+            let ray = Vector3::new(elevation.cos() * cos, elevation.cos() * sin, elevation.sin());
+            let (from, way) = (map_from_sensor.translation.vector, map_from_sensor.rotation * ray);
+            let to_plane = |at: f64, k: usize| {
+                let range_m = (at - from[k]) / way[k];
+                if range_m > 0.0 { range_m } else { f64::MAX }
+            };
+            let half = 0.5 * width_m;
+            let planes = [(half, 1), (-half, 1), (-1.0, 2), (1.8, 2)];
+            let range_m = planes.map(|(at, k)| to_plane(at, k)).into_iter().fold(f64::MAX, f64::min);
+            if range_m < 60.0 {
+                let noise_m: f64 = (0..4).map(|_| random.random_range(-0.013..0.013)).sum();
+                let [x, y, z]: [f64; 3] = (ray * (range_m + noise_m)).into();
+                points.push(Point::new(x as f32, y as f32, z as f32));
+            }
+        }
+    }
+    points
+}
+
+#[test]
+fn along_a_bare_corridor_true_odometry_is_not_overruled() {
+    for seed in 0..10 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let width_m = random.random_range(1.8..3.0);
+        let mapped = Mapped::new();
+        let along = |x: f64, random: &mut ChaCha8Rng| {
+            let mut small = || random.random_range(-0.015..0.015);
+            Pose::from_parts(
+                Translation3::new(x, small(), small()),
+                UnitQuaternion::from_euler_angles(small(), small(), 2.0 * small()),
+            )
+        };
+        let places = [-4.0, -3.0, -2.0, -1.0, 0.0].map(|x| along(x, &mut random));
+        for place in places {
+            mapped.add(&corridor(width_m, &place, &mut random), place);
+        }
+        let [.., last] = places;
+        let truth = along(random.random_range(0.5..1.2), &mut random);
+        let off = Pose::translation(random.random_range(-0.01..0.01), random.random_range(-0.01..0.01), 0.0);
+        let motion = Guess::Motion(last.inverse() * truth * off);
+        mapped.assert_not_misled(&corridor(width_m, &truth, &mut random), motion, &truth);
+    }
+}
+
+#[test]
+fn a_robot_that_a_lift_took_up_unseen_is_not_believed_below() {
+    let lidar =
+        SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
+    for seed in 0..8 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mapped = Mapped::new();
+        let floors = [0, 1].map(|floor| Scene::rectangular_room(500 + 2 * seed + floor, [9.0, 7.0], 3));
+        let heights = [Pose::identity(), Pose::translation(0.0, 0.0, 3.2)];
+        for (scene, map_from_room) in floors.iter().zip(&heights).rev() {
+            for k in 0..5 {
+                let room_from_sensor =
+                    at(0.3 * f64::from(k) - 0.6, 0.1 * f64::from(k % 2), 0.8, 0.1 * f64::from(k));
+                let points = finite(lidar.scan(scene, &room_from_sensor, &mut random));
+                mapped.add(&points, map_from_room * room_from_sensor);
+            }
+        }
+        let room_from_sensor = at(0.7, 0.2, 0.8, 0.5);
+        let points = finite(lidar.scan(&floors[1], &room_from_sensor, &mut random));
+        mapped.assert_not_misled(&points, Guess::Last, &(heights[1] * room_from_sensor));
+    }
+}
