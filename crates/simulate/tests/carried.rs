@@ -1,4 +1,4 @@
-//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled where rays cannot tell.
+//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled by far where rays cannot tell.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
@@ -35,12 +35,12 @@ impl Mapped {
         assert!(self.mapper().map_scan(&scan, StopSignal::NEVER).unwrap().is_inserted());
     }
 
-    /// Aligns a scan from a guess. It may be refused; accepted it has to be where it was taken.
-    fn assert_not_misled(&self, points: &[Point], guess: Guess, truth: &Pose) {
+    /// Aligns a scan from a guess. It may be refused; accepted it has to be so near to where it was taken.
+    fn assert_not_misled(&self, points: &[Point], guess: Guess, truth: &Pose, off_max_m: f64) {
         let scan = Scan { guess, ..Scan::new(&self.robot, points) };
         let found = self.mapper().locate(&scan, StopSignal::NEVER).unwrap().alignment;
         let (meters, degrees) = pose_difference(&found.map_from_sensor, truth);
-        let is_right = meters < 2.0 * RESOLUTION_M && degrees < 2.0;
+        let is_right = meters < off_max_m && degrees < 2.0;
         let was = format!("accepted {meters:.2} m {degrees:.1} deg off: {}", found.reason);
         assert!(is_right || found.verdict != mrol_map::align::Verdict::Accepted, "{was}");
     }
@@ -81,7 +81,7 @@ fn corridor(width_m: f64, map_from_sensor: &Pose, random: &mut ChaCha8Rng) -> Ve
 }
 
 #[test]
-fn along_a_bare_corridor_true_odometry_is_not_overruled() {
+fn along_a_bare_corridor_no_pose_is_believed_that_odometry_rules_out() {
     for seed in 0..10 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let width_m = random.random_range(1.8..3.0);
@@ -100,8 +100,11 @@ fn along_a_bare_corridor_true_odometry_is_not_overruled() {
         let [.., last] = places;
         let truth = along(random.random_range(0.5..1.2), &mut random);
         let off = Pose::translation(random.random_range(-0.01..0.01), random.random_range(-0.01..0.01), 0.0);
-        let motion = Guess::Motion(last.inverse() * truth * off);
-        mapped.assert_not_misled(&corridor(width_m, &truth, &mut random), motion, &truth);
+        let motion = last.inverse() * truth * off;
+        // Three deviations of what odometry is expected to err by, a tenth of the way, and of a voxel.
+        let off_max_m = 3.0 * (0.1 * motion.translation.vector.norm()).hypot(RESOLUTION_M) + 0.02;
+        let points = corridor(width_m, &truth, &mut random);
+        mapped.assert_not_misled(&points, Guess::Motion(motion), &truth, off_max_m);
     }
 }
 
@@ -124,6 +127,6 @@ fn a_robot_that_a_lift_took_up_unseen_is_not_believed_below() {
         }
         let room_from_sensor = at(0.7, 0.2, 0.8, 0.5);
         let points = finite(lidar.scan(&floors[1], &room_from_sensor, &mut random));
-        mapped.assert_not_misled(&points, Guess::Last, &(heights[1] * room_from_sensor));
+        mapped.assert_not_misled(&points, Guess::Last, &(heights[1] * room_from_sensor), 2.0 * RESOLUTION_M);
     }
 }

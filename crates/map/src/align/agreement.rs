@@ -78,9 +78,6 @@ impl RayCounts {
     }
 }
 
-/// Points that are contradicted by chance: at a pose that is as good none may be, and four at another, two deviations of their number.
-const CHANCE: f64 = 4.0;
-
 impl RayAgreement {
     /// The smaller share of both sides.
     pub fn worse(&self) -> f64 {
@@ -90,15 +87,6 @@ impl RayAgreement {
     /// The larger share of both sides: people and what was moved contradict one side only.
     pub fn better(&self) -> f64 {
         self.of_scan.share().max(self.of_map.share())
-    }
-
-    /// How many times as much is contradicted at another pose, of the side of which that is more: people contradict one side wherever
-    /// the scan is put. As many points as counts vary by, two deviations where none is contradicted here, are chance.
-    pub(super) fn contrast(&self, there: &Self) -> f64 {
-        let of = |here: RayCounts, there: RayCounts| {
-            (there.contradicted as f64 + CHANCE) / (here.contradicted as f64 + CHANCE)
-        };
-        of(self.of_scan, there.of_scan).max(of(self.of_map, there.of_map))
     }
 
     /// The smaller evidence of both sides.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
+use super::agreement::{RayAgreement, Rays, Rival};
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
@@ -28,8 +28,6 @@ const AGREEMENT_MIN: f64 = 0.9;
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
-/// How many times as much rays have to contradict a pose that is told from an end, or how many times as little to agree with it.
-const CONTRAST_MIN: f64 = 2.0;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
 
@@ -231,18 +229,8 @@ impl<'a> Ends<'a> {
         (is_possible && is_as_likely).then_some(Rival { map_from_sensor, agreement })
     }
 
-    /// True of a pose that rays tell clearly from an end: they agree with half as many points there, or contradict several times as many.
-    pub(super) fn is_clearly_worse(&self, pose: &Pose, end: &End) -> bool {
-        let (here, there) = (&end.agreement, self.agreement_at(pose));
-        let is_lost =
-            |here: RayCounts, there: RayCounts| there.agree as f64 * CONTRAST_MIN <= here.agree as f64;
-        here.contrast(&there) >= CONTRAST_MIN
-            || is_lost(here.of_scan, there.of_scan)
-            || is_lost(here.of_map, there.of_map)
-    }
-
     /// How rays agree at some other pose.
-    fn agreement_at(&self, pose: &Pose) -> RayAgreement {
+    pub(super) fn agreement_at(&self, pose: &Pose) -> RayAgreement {
         Look::of(self.rays, pose, &self.witnesses, self.stop).agreement()
     }
 

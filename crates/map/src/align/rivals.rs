@@ -6,7 +6,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
-use super::agreement::{RayAgreement, Rays};
+use super::agreement::{RayAgreement, RayCounts, Rays};
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
 use super::ends::{End, Ends, RIVAL};
 use super::prior::PosePrior;
@@ -21,7 +21,8 @@ use crate::map::MultiResolutionMap;
 /// each other.
 const CONTRADICTED_MIN: f64 = 0.005;
 const UNUSUAL: f64 = 2.0;
-/// Rays have to tell a pose from those aside: so many r_0, or turned by so many degrees.
+/// How many times as much rays have to contradict a pose aside: so many r_0, or turned by so many degrees.
+const CONTRAST_MIN: f64 = 2.0;
 const ASIDE_VOXELS: f64 = 8.0;
 const ASIDE_DEG: f64 = 10.0;
 /// Other places are looked for where what is known beforehand reaches farther than this, r_0.
@@ -166,7 +167,7 @@ impl Contest<'_> {
             let aside = Pose::from_parts(shift * pose.translation, turn * pose.rotation);
             // Most are ruled out by what is known beforehand, without a look.
             let farther = ends.deviations(&aside).powi(2) - end.deviations.powi(2);
-            farther <= RIVAL && !ends.is_clearly_worse(&aside, end)
+            farther <= RIVAL && contrast(&end.agreement, &ends.agreement_at(&aside)) < CONTRAST_MIN
         };
         let (shift, degrees) = shifts.into_iter().chain(turns).find(is_open)?;
         Some(match degrees == 0.0 {
@@ -181,6 +182,14 @@ fn least_held(found: &Alignment) -> Option<Vector2<f64>> {
     let directions = found.information.directions().into_iter();
     let on_floor = directions.map(|open| Vector2::new(open.direction[0], open.direction[1]));
     on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())
+}
+
+/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one side wherever the
+/// scan is put. One point more or less is chance.
+fn contrast(here: &RayAgreement, there: &RayAgreement) -> f64 {
+    let of =
+        |here: RayCounts, there: RayCounts| (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64;
+    of(here.of_scan, there.of_scan).max(of(here.of_map, there.of_map))
 }
 
 /// Says how rays agree at a pose.
