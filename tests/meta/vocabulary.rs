@@ -63,7 +63,7 @@ const REPLACED: [(&str, &str); 80] = [
     ("filter_bits_per_voxel", "bits_per_key"),
     ("disk_free_back_mib", "disk_free_resume_mib"),
     ("memory_back_mib", "memory_resume_mib"),
-    ("is_stationary", "is_stationary"),
+    ("is_standing", "is_stationary"),
     ("StandingSettings", "StationarySettings"),
     ("twin", "scalar or SIMD variant, reference implementation"),
     ("twins", "scalar and SIMD variants"),
