@@ -52,15 +52,11 @@ pub(super) fn turned(
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_TURNS, settings);
-    few.as_good(pose, other_yaws(pose).collect(), map.settings().levels - 1)
-}
-
-/// A pose (map_from_sensor), turned about the map's z axis by each of the yaws that are tried.
-pub(super) fn other_yaws(pose: &Pose) -> impl Iterator<Item = Pose> {
-    (1..YAWS).map(|yaw| {
+    let guesses = (1..YAWS).map(|yaw| {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (TAU * f64::from(yaw) / f64::from(YAWS)));
         Pose::from_parts(pose.translation, turn * pose.rotation)
-    })
+    });
+    few.as_good(pose, guesses.collect(), map.settings().levels - 1)
 }
 
 /// Where a scan that was found at `pose` may fit as well, shifted along `axes` (of length 1, map frame) by up to `possible_m`, either way.

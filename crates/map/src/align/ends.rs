@@ -110,7 +110,8 @@ impl<'a> Ends<'a> {
         }
     }
 
-    /// Asks further witnesses of ends of which those of the first ones cannot speak: on another floor they saw nothing.
+    /// Adds witnesses near the ends that the present witnesses did not see, and compares all ends anew. Witnesses on one floor see
+    /// nothing of another.
     pub(super) fn hear_further_witnesses(&mut self, map: &MultiResolutionMap) {
         let unseen = self.all.iter().filter(|end| !has_evidence(&end.agreement));
         let poses: Vec<Pose> = unseen.map(|end| end.alignment.map_from_sensor).collect();
@@ -213,7 +214,8 @@ impl<'a> Ends<'a> {
         ends.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
     }
 
-    /// The guess, where the scan would show new ground there, or where `best` is farther from it than guesses are off.
+    /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard deviations
+    /// away from it.
     ///
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
     fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {

@@ -52,7 +52,7 @@ impl Witnesses {
         witnesses
     }
 
-    /// Adds those of further poses.
+    /// Adds the witnesses of further poses.
     pub(super) fn add(
         &mut self,
         rays: &Rays,

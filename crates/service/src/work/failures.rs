@@ -1,4 +1,4 @@
-//! Whose long work has come to nothing lately.
+//! Requesters whose recent long work failed.
 
 use std::collections::HashMap;
 
@@ -6,9 +6,9 @@ use parking_lot::Mutex;
 
 use super::asker::Requester;
 
-/// As many failures without a success between them, and work gives way.
+/// Consecutive failures after which a requester's work runs in shorter parts.
 const FAILURES_MAX: u32 = 3;
-/// Requesters that are remembered: of more, those who failed longest ago are forgotten.
+/// Requesters that are remembered, at most; beyond, the one that failed longest ago is forgotten.
 const REMEMBERED_MAX: usize = 1024;
 
 /// Requesters whose work failed, with the failures since their last success.
@@ -28,7 +28,7 @@ struct Failed {
 }
 
 impl Failures {
-    /// Notes how work ended, for the robot and for its asker, who may send under a new name each time.
+    /// Notes how work ended, for the robot and for its asker: an asker may send each scan under a new robot name.
     pub(super) fn note(&self, requester: &Requester, succeeded: bool) {
         let mut state = self.0.lock();
         state.noted += 1;
@@ -47,7 +47,7 @@ impl Failures {
         }
     }
 
-    /// True of a robot, or an asker, of whom nothing succeeded the last times.
+    /// True after [`FAILURES_MAX`] consecutive failures of the robot, or of its asker.
     pub(super) fn is_failing(&self, requester: &Requester) -> bool {
         let state = self.0.lock();
         let fails = |who: &Requester| state.of.get(who).is_some_and(|failed| failed.times >= FAILURES_MAX);

@@ -7,9 +7,9 @@ use super::fair_queue::{FairQueue, HeldThread};
 use super::threads::Threads;
 use mrol_map::util::GiveWay;
 
-/// A part of long work: after so long it gives way, where somebody else waits.
+/// Time that a part of long work takes, after which the job gives way if others wait.
 pub(super) const PART: Duration = Duration::from_millis(25);
-/// A part of the work of somebody whose work fails again and again.
+/// The same for a requester whose work keeps failing.
 pub(super) const PART_OF_FAILING: Duration = Duration::from_millis(5);
 
 /// The thread of a job in hand, which the job gives back between its parts.

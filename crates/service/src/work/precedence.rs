@@ -1,11 +1,11 @@
-//! Work that has precedence over a lane: while there is some, the lane uses a part of its threads.
+//! Work that has precedence over a lane. While such work runs, the lane uses fewer of its threads.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 
-/// For so long after it, work that has precedence counts as there: a robot scans several times a second.
+/// Time for which precedence lasts after the work has ended: robots scan several times a second.
 const LINGERS: Duration = Duration::from_secs(1);
 
 /// Work that has precedence. A clone is another handle on the same work.

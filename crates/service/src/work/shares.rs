@@ -6,8 +6,8 @@ use parking_lot::Mutex;
 
 use super::asker::Asker;
 
-/// A number of places. An asker has at most as many as are left: the first may take half of them, the next half of the
-/// rest, so that there is room for who comes late.
+/// A number of places. An asker may hold at most as many as are left. So the first can take half of them and the next half
+/// of the rest, and a late asker still finds a place.
 #[derive(Debug)]
 pub(super) struct Shares {
     most: usize,
