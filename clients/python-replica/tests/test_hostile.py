@@ -208,9 +208,12 @@ def test_an_array_that_changes_meanwhile_changes_nothing_of_the_question(replica
 def test_a_panic_of_the_extension_is_an_error(replica: mrol_replica.Replica) -> None:
     # The package refuses such times before they come there.
     native = replica._opened  # noqa: SLF001
-    options: dict[str, Any] = dict.fromkeys(["key", "ca", "certificate", "private_key", "silence_s", "region", "blocks_max"], None)
+    options: dict[str, Any] = dict.fromkeys(
+        ["key", "ca", "certificate", "private_key", "silence_s", "region", "blocks_max", "age_max_s"], None
+    )
     for panics in (
         lambda: native.wait_for_revision(0, float("nan")),
+        lambda: native.check_age(float("nan")),
         lambda: type(native)("http://127.0.0.1:9", "m", timeout_s=-1.0, bloom=False, viewpoints=False, **options),
     ):
         with pytest.raises(mrol.MrolError, match="a defect of mrol_replica: it panicked"):

@@ -102,7 +102,7 @@ def test_what_does_not_belong_into_a_change_is_refused(local: mrol_replica.Local
 
 
 def test_every_operation_is_asked() -> None:
-    apart = {"close", "load", "save", "status", "revision", "wait_for_revision"}
+    apart = {"close", "load", "save", "status", "revision", "wait_for_revision", "check_age"}
     for kind, operations in ((mrol_replica.Replica, QUESTIONS), (mrol_replica.LocalMap, QUESTIONS | OF_LOCAL_MAPS)):
         public = {name for name, _ in inspect.getmembers(kind) if not name.startswith("_")}
         assert public | {"motion_is_free"} == (set(operations) | apart) & (public | set(operations))
@@ -128,8 +128,11 @@ def test_what_makes_no_map_and_no_replica_is_refused(
             given: dict[str, Any] = {"revision": 1 << 40, "timeout_s": 0.01, name: value}
             error = error_of(lambda given=given: replica.wait_for_revision(**given))  # type: ignore[misc]
             assert isinstance(error, mrol.DeadlineExceeded) or (isinstance(error, mrol.ArgumentError) and error.argument == name)
+    if odd not in ("five", "a half", "a number of numpy"):
+        must_be_named(lambda: replica.check_age(value), "age_max_s", odd)
     nowhere = {"address": "http://127.0.0.1:9", "map": "m"}
-    for name in ("address", "map", "key", "ca", "certificate", "region", "silence_s", "blocks_max", "bloom", "viewpoints"):
+    of_connection = ("address", "map", "key", "ca", "certificate")
+    for name in (*of_connection, "region", "silence_s", "blocks_max", "bloom", "viewpoints", "age_max_s"):
         if (name, odd) == ("address", "text"):
             continue
         options = {"private_key": "never.pem"} if name == "certificate" and odd != "None" else {}
