@@ -331,10 +331,19 @@ async fn a_read_waits_for_its_revision_or_its_deadline() {
     let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = patience).await;
     daemon.make_map("a").await;
     let mut planner = daemon.occupancy().await;
-    let mut hurried = Request::new(later());
-    hurried.set_timeout(Duration::from_millis(60));
-    let hurried = planner.query_points(hurried).await.unwrap_err();
-    assert_eq!(hurried.code(), Code::DeadlineExceeded, "{hurried}");
+    // The client looks at the same clock, and calls it cancelled where it is the first to notice.
+    let mut is_told = false;
+    for _ in 0..20 {
+        let mut hurried = Request::new(later());
+        hurried.set_timeout(Duration::from_millis(60));
+        let hurried = planner.query_points(hurried).await.unwrap_err();
+        assert!(matches!(hurried.code(), Code::DeadlineExceeded | Code::Cancelled), "{hurried}");
+        is_told |= hurried.code() == Code::DeadlineExceeded;
+        if is_told {
+            break;
+        }
+    }
+    assert!(is_told, "the server does not keep the deadline of a call");
 
     let second = [row(2)[1]];
     let (answer, _) = tokio::join!(planner.query_points(later()), daemon.put_in("a", &second));

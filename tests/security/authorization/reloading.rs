@@ -11,12 +11,14 @@ use tonic::{Code, Request};
 
 use super::asking::{Outcome, over_grpc};
 use super::keyring::{Guarded, add};
-use crate::support::daemon::{PATIENCE, query_pb};
+use crate::support::daemon::{PATIENCE, client, query_pb};
 
-/// Waits until listing maps with `key` is answered with `status`.
+/// Waits until listing maps with `key` is answered with `status`. An answer that is on its way while its key is withdrawn is cut
+/// off, which counts as another one.
 async fn until(server: &Guarded, key: &Secret, status: StatusCode) {
     let start = Instant::now();
-    while server.http(Method::GET, "/v1/maps", Some(key), None).await.status() != status {
+    let listed = || client().get(server.daemon.url("/v1/maps")).bearer_auth(key.reveal()).send();
+    while !listed().await.is_ok_and(|answer| answer.status() == status) {
         assert!(start.elapsed() < PATIENCE, "it is never answered with {status}");
         tokio::time::sleep(Duration::from_millis(50)).await;
     }

@@ -6,6 +6,7 @@
 
 mod cube_map;
 mod density;
+mod image_bytes;
 mod nearest_depths;
 mod newly_seen;
 mod range_image;
@@ -17,18 +18,21 @@ mod scan_rays;
 mod scan_surface;
 mod set;
 mod sight;
+mod sweep;
 #[cfg(test)]
 mod tests;
 mod tile;
 mod vectors;
 mod viewpoint;
 
+pub use image_bytes::RangeImageError;
 pub use newly_seen::{newly_seen_by_rays_m3, newly_seen_m3};
-pub use range_image::{IMAGE_BYTES_MAX, Met, RangeImage, RangeImageError, Sweep, WellBeyond};
+pub use range_image::{IMAGE_BYTES_MAX, Met, RangeImage, WellBeyond};
 pub use ray_index::RayWindow;
 pub use scan_image::ScanImage;
 pub use scan_rays::ScanRays;
 pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
 pub use sight::Sight;
+pub use sweep::Sweep;
 pub use viewpoint::{VIEWPOINT_MEMORY_MAX, Viewpoint};

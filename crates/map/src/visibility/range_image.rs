@@ -2,34 +2,24 @@
 
 use super::cube_map::{CubeMap, Pixel, Projection};
 use super::density::PointDensity;
+use super::image_bytes::tiles_max;
 use super::nearest_depths::{NearestDepths, SPACING_MAX};
 use super::ray_gaps::RayGaps;
 use super::sight::{Sight, sight};
-use super::tile::{TILE_BYTES, Tile};
+use super::sweep::Sweep;
+use super::tile::Tile;
 use super::vectors::norm;
 use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
-/// Tiles along the side of a face, finest first, fewer than [`TELLS_OPEN`]: pixels of 0.6 to 7 degrees.
+/// Tiles along the side of a face, finest first, fewer than an image's first byte has room for (`image_bytes`): pixels of 0.6 to 7 degrees.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
-/// Bytes of an image before its tiles: how many there are along a side, the unit of depths, and how the rays lay.
-const HEAD_BYTES: usize = 1 + 3 * 4;
-/// Says in an image's first byte that its head tells how the rays lay. The first images did not.
-const TELLS_RAYS: u8 = 0x80;
-/// Says in an image's first byte that a number is behind its head: from where on nothing was met.
-const TELLS_OPEN: u8 = 0x40;
-/// Bytes of that number.
-const OPEN_BYTES: usize = 4;
 /// How much nearer than where nothing was met a pixel may tell it, as a share: its depth is the least of rays that ran up to 2.9 degrees
 /// away, and of a place in it.
 const OPEN_SLACK: f32 = 0.035;
-/// Bytes of what their heads did not tell.
-const RAYS_BYTES: usize = 2 * 4;
 /// Depths in the image's unit are at most this.
-const DEPTH_MAX: f32 = u16::MAX as f32;
-/// Movements of the sensor up to this are taken for none, meters.
-const MOVED_MIN_M: f32 = 0.01;
+pub(super) const DEPTH_MAX: f32 = u16::MAX as f32;
 /// Pixels around one in which what is seen from a moving sensor is looked for, at most.
 const MOVED_PIXELS_MAX: f32 = 8.0;
 /// How much more coarser pixels have to tell, since they tell it less well.
@@ -45,19 +35,19 @@ const WORTHWHILE: f32 = 1.03;
 /// a place counts as seen through only where all that lies so near to it was.
 #[derive(Clone, PartialEq)]
 pub struct RangeImage {
-    map: CubeMap,
+    pub(super) map: CubeMap,
     /// Meters of one unit of depth.
-    unit_m: f32,
-    rays: Rays,
+    pub(super) unit_m: f32,
+    pub(super) rays: Rays,
     /// [`Sweep::open_m`].
-    open_m: f32,
+    pub(super) open_m: f32,
     /// For each tile of the cube its number among those that are kept.
-    places: Vec<u16>,
-    tiles: Vec<Tile>,
+    pub(super) places: Vec<u16>,
+    pub(super) tiles: Vec<Tile>,
 }
 
 /// The place of a tile that is not kept.
-const NOT_SEEN: u16 = u16::MAX;
+pub(super) const NOT_SEEN: u16 = u16::MAX;
 
 /// A place that a scan met.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,24 +58,13 @@ pub struct Met {
     pub error_m: f32,
 }
 
-/// How a scan looked around.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sweep {
-    /// What is further away is seen up to here, meters.
-    pub range_max_m: f32,
-    /// How far the sensor was, at most, from the scan's pose when it took a ray, meters; 0 of one that stood.
-    pub moved_m: f32,
-    /// Rays that end here or farther away met nothing: they run on, meters. Infinite: each met something.
-    pub open_m: f32,
-}
-
 /// How the rays of an image lay.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Rays {
+pub(super) struct Rays {
     /// [`Sweep::moved_m`].
-    moved_m: f32,
+    pub(super) moved_m: f32,
     /// [`PointDensity::spacing`].
-    spacing: f32,
+    pub(super) spacing: f32,
 }
 
 /// What it takes to have seen well beyond a place.
@@ -95,31 +74,6 @@ pub struct WellBeyond {
     pub margin_m: f32,
     /// How far from each other rays may have passed it, meters: what is larger than that was met by one.
     pub gap_max_m: f32,
-}
-
-/// Why bytes are not a range image.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RangeImageError {
-    /// Too few bytes, or too many.
-    #[error("a range image of {got} bytes, {expected} expected")]
-    Length {
-        /// Bytes that are there.
-        got: usize,
-        /// Bytes that its head and its tiles make.
-        expected: usize,
-    },
-    /// The number of tiles along a side is out of range.
-    #[error("a range image of {0} tiles along a side, at least 1 expected")]
-    Tiles(usize),
-    /// The unit of depths is not a positive number.
-    #[error("a range image with {0} m as its unit of depth, a positive number expected")]
-    Unit(f32),
-    /// What it tells of its rays cannot be.
-    #[error("a range image whose sensor moved by {0} m, its rays {1} apart: neither may be negative")]
-    Rays(f32, f32),
-    /// What it tells of rays that ran on cannot be.
-    #[error("a range image whose rays ran on beyond {0} m, a number from 0 expected")]
-    Open(f32),
 }
 
 impl RangeImage {
@@ -321,87 +275,9 @@ impl RangeImage {
         self.map.pitch()
     }
 
-    /// Bytes of the image where it is stored.
-    pub fn stored_bytes(&self) -> usize {
-        stored_bytes(self.map, self.tiles.len()) + if self.tells_open() { OPEN_BYTES } else { 0 }
-    }
-
-    /// True where some of its rays ran on.
-    fn tells_open(&self) -> bool {
-        self.open_m.is_finite()
-    }
-
     /// Bytes of memory.
     pub fn memory_bytes(&self) -> usize {
         self.places.len() * size_of::<u16>() + self.tiles.len() * size_of::<Tile>()
-    }
-
-    /// The image as bytes: how many tiles there are along a side and 128 (1 byte; and 64 where rays ran on), the unit of depths (f32), how
-    /// far the sensor moved in meters (f32) and how far apart the rays lay at depth 1 (f32), from where on nothing was met in meters
-    /// (f32; where rays ran on), a bit for each tile of the six faces that says whether it is
-    /// kept, and the tiles that are. All little-endian. The first images, without the 128, told nothing of their rays.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(self.stored_bytes());
-        let tells_open = if self.tells_open() { TELLS_OPEN } else { 0 };
-        bytes.push(self.map.tiles() as u8 | TELLS_RAYS | tells_open);
-        let open_m = self.tells_open().then_some(self.open_m);
-        for number in [self.unit_m, self.rays.moved_m, self.rays.spacing].into_iter().chain(open_m) {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
-        bytes.extend(self.places.chunks(8).map(|places| {
-            let bit = |(i, place): (usize, &u16)| u8::from(*place != NOT_SEEN) << i;
-            places.iter().enumerate().map(bit).sum::<u8>()
-        }));
-        self.tiles.iter().for_each(|tile| tile.write(&mut bytes));
-        bytes
-    }
-
-    /// The inverse of [`RangeImage::to_bytes`].
-    ///
-    /// # Errors
-    /// For bytes that are not an image.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RangeImageError> {
-        let short = RangeImageError::Length { got: bytes.len(), expected: HEAD_BYTES };
-        let (&first, rest) = bytes.split_first().ok_or_else(|| short.clone())?;
-        let (unit_m, rest) = number_from(rest).ok_or_else(|| short.clone())?;
-        let tells_rays = first & TELLS_RAYS != 0;
-        let (rays, rest) = if tells_rays {
-            Rays::from_bytes(rest).ok_or_else(|| short.clone())?
-        } else {
-            (Rays::NOT_TOLD, rest)
-        };
-        let tells_open = tells_rays && first & TELLS_OPEN != 0;
-        let (open_m, rest) = if tells_open { number_from(rest).ok_or(short)? } else { (f32::INFINITY, rest) };
-        let tiles = usize::from(first & !(if tells_rays { TELLS_RAYS | TELLS_OPEN } else { TELLS_RAYS }));
-        if tiles == 0 {
-            return Err(RangeImageError::Tiles(tiles));
-        }
-        if !(unit_m > 0.0 && (unit_m * DEPTH_MAX).is_finite()) {
-            return Err(RangeImageError::Unit(unit_m));
-        }
-        let Rays { moved_m, spacing } = rays;
-        if !(moved_m >= 0.0 && moved_m.is_finite() && spacing >= 0.0 && spacing.is_finite()) {
-            return Err(RangeImageError::Rays(moved_m, spacing));
-        }
-        if tells_open && !(open_m >= 0.0 && open_m.is_finite()) {
-            return Err(RangeImageError::Open(open_m));
-        }
-        let map = CubeMap::new(tiles);
-        let count = map.tiles_of_all_faces();
-        let bits = &rest[..count.div_ceil(8).min(rest.len())];
-        let is_kept = |tile: usize| bits.get(tile / 8).is_some_and(|byte| byte >> (tile % 8) & 1 == 1);
-        let kept = (0..count).filter(|&tile| is_kept(tile)).count();
-        let open = if tells_open { OPEN_BYTES } else { 0 };
-        let expected = stored_bytes(map, kept) + open - if tells_rays { 0 } else { RAYS_BYTES };
-        if bytes.len() != expected {
-            return Err(RangeImageError::Length { got: bytes.len(), expected });
-        }
-        let mut places = vec![NOT_SEEN; count];
-        for (place, tile) in (0..count).filter(|&tile| is_kept(tile)).enumerate() {
-            places[tile] = place as u16;
-        }
-        let (tiles, _) = rest[bits.len()..].as_chunks::<TILE_BYTES>();
-        Ok(Self { map, unit_m, rays, open_m, places, tiles: tiles.iter().map(Tile::read).collect() })
     }
 }
 
@@ -410,53 +286,4 @@ impl std::fmt::Debug for RangeImage {
         let Self { map, unit_m, tiles, .. } = self;
         write!(f, "RangeImage {{ side: {}, unit_m: {unit_m}, tiles: {} }}", map.pixels(), tiles.len())
     }
-}
-
-impl Sweep {
-    /// The sweep of a sensor that stood.
-    pub const fn standing(range_max_m: f32) -> Self {
-        Self { range_max_m, moved_m: 0.0, open_m: f32::INFINITY }
-    }
-
-    /// The point at `offset` from the sensor, as far as it is seen; none of what has no direction.
-    pub fn limited(self, offset: [f32; 3]) -> Option<[f32; 3]> {
-        let squared = offset.iter().map(|c| c * c).sum::<f32>();
-        if !(squared > 0.0 && squared.is_finite()) {
-            return None;
-        }
-        let scale = (self.range_max_m / squared.sqrt()).min(1.0);
-        Some(offset.map(|c| c * scale))
-    }
-
-    /// How far the sensor moved, where that is more than noise.
-    fn told_moved_m(self) -> f32 {
-        if self.moved_m > MOVED_MIN_M { self.moved_m } else { 0.0 }
-    }
-}
-
-impl Rays {
-    /// What is taken of the first images: a sensor that stood, and rays as far apart as they may lie in a pixel.
-    const NOT_TOLD: Self = Self { moved_m: 0.0, spacing: SPACING_MAX };
-
-    fn from_bytes(bytes: &[u8]) -> Option<(Self, &[u8])> {
-        let (moved_m, rest) = number_from(bytes)?;
-        let (spacing, rest) = number_from(rest)?;
-        Some((Self { moved_m, spacing }, rest))
-    }
-}
-
-/// A number at the beginning of some bytes, and the bytes behind it.
-fn number_from(bytes: &[u8]) -> Option<(f32, &[u8])> {
-    let (number, rest) = bytes.split_first_chunk()?;
-    Some((f32::from_le_bytes(*number), rest))
-}
-
-/// Bytes of an image with `kept` tiles where it is stored.
-fn stored_bytes(map: CubeMap, kept: usize) -> usize {
-    HEAD_BYTES + map.tiles_of_all_faces().div_ceil(8) + kept * TILE_BYTES
-}
-
-/// Tiles that an image of at most `bytes` bytes can keep.
-fn tiles_max(map: CubeMap, bytes: usize) -> usize {
-    bytes.saturating_sub(stored_bytes(map, 0)) / TILE_BYTES
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use uuid::Uuid;
 
@@ -24,6 +26,11 @@ use mrol_map::util::StopSignal;
 const MAPS: &str = "maps";
 const LOCK_FILE: &str = "lock";
 
+/// How long a lock that another process holds is waited for.
+const LOCK_WAIT_MAX: Duration = Duration::from_secs(1);
+/// How long until it is tried again.
+const LOCK_RETRY: Duration = Duration::from_millis(20);
+
 /// The data folder, where a server keeps its maps. One process may hold it at a time.
 #[derive(Debug)]
 pub struct DataDir {
@@ -38,20 +45,26 @@ pub struct DataDir {
 }
 
 impl DataDir {
-    /// Opens the data folder, creates it where it does not exist, and locks it.
+    /// Opens the data folder, creates it where it does not exist, and locks it. A server that is just ending, or a process that
+    /// inherits the lock for the moment until its program starts, is waited for, up to a second.
     ///
     /// # Errors
-    /// When another process holds it or the system refuses.
+    /// When another process holds it for longer or the system refuses.
     pub fn open(path: &Path, settings: StoreSettings) -> Result<Self, StoreError> {
         let disk = Disk::of_mode(settings.mode);
         make_folder(&disk, path).map_err(StoreError::io(path))?;
         let lock_path = path.join(LOCK_FILE);
         let lock = disk.creation().open(&lock_path).map_err(StoreError::io(&lock_path))?;
-        match lock.try_lock() {
-            Ok(()) => Ok(Self { _lock: Some(lock), ..Self::on(Arc::new(disk), path, settings)? }),
-            Err(TryLockError::WouldBlock) => Err(StoreError::InUse(path.to_owned())),
-            Err(TryLockError::Error(e)) => Err(StoreError::io(lock_path)(e)),
+        let begin = Instant::now();
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if begin.elapsed() < LOCK_WAIT_MAX => thread::sleep(LOCK_RETRY),
+                Err(TryLockError::WouldBlock) => return Err(StoreError::InUse(path.to_owned())),
+                Err(TryLockError::Error(e)) => return Err(StoreError::io(lock_path)(e)),
+            }
         }
+        Ok(Self { _lock: Some(lock), ..Self::on(Arc::new(disk), path, settings)? })
     }
 
     /// Opens the data folder on another file system, without a lock.
@@ -299,4 +312,27 @@ fn make_folder(files: &dyn FileSystem, folder: &Path) -> std::io::Result<()> {
     }
     files.create_folder(folder)?;
     files.sync(folder::folder_of(folder))
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+    use super::*;
+
+    #[test]
+    fn a_lock_that_is_given_up_soon_is_waited_for_and_another_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = || DataDir::open(folder.path(), StoreSettings::default());
+        let first = open().unwrap();
+        assert!(matches!(open(), Err(StoreError::InUse(_))));
+        thread::scope(|scope| {
+            let ending = scope.spawn(|| {
+                thread::sleep(3 * LOCK_RETRY);
+                drop(first);
+            });
+            open().unwrap();
+            ending.join().unwrap();
+        });
+    }
 }

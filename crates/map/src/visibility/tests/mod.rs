@@ -1,0 +1,5 @@
+//! Tests of visibility.
+
+mod gaps;
+mod images;
+mod scenes;
