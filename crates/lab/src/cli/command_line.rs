@@ -33,6 +33,9 @@ enum Command {
     /// The server, as `mrol serve`: what is measured in a process of its own
     #[command(hide = true)]
     Serve(Serve),
+    /// The attackers of `experiment attack`, in a process of their own
+    #[command(hide = true)]
+    Attackers(experiment::Attackers),
 }
 
 /// Runs the command line of this process and returns its exit code.
@@ -49,6 +52,7 @@ pub fn run() -> ExitCode {
     let done = match command {
         Command::Bench(bench) => bench.run(output),
         Command::Experiment(experiment) => experiment.run(output),
+        Command::Attackers(attackers) => runtime::block_on(attackers.run(output)),
         Command::Serve(serve) => runtime::block_on(serve.run(output)),
     };
     done.map_or_else(CliError::report, |()| ExitCode::SUCCESS)

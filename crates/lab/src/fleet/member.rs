@@ -35,9 +35,21 @@ impl<M: Member> Fleet<M> {
         Self { members, number: 0 }
     }
 
+    /// Starts the members for `time`, at `rate` operations a second in total, of which those are left out that are late by
+    /// a whole period.
+    pub(crate) fn work_skipping(self, rate: f64, time: Duration) -> Result<Working<M>, FleetError> {
+        let pace = Pace::new(Some(rate), time, self.number).skipping();
+        self.work_at(pace)
+    }
+
     /// Starts the members for `time`, without a pause or at `rate` operations a second in total.
     pub(crate) fn work(self, rate: Option<f64>, time: Duration) -> Result<Working<M>, FleetError> {
-        let pace = Arc::new(Pace::new(rate, time, self.number));
+        let pace = Pace::new(rate, time, self.number);
+        self.work_at(pace)
+    }
+
+    fn work_at(self, pace: Pace) -> Result<Working<M>, FleetError> {
+        let pace = Arc::new(pace);
         let tally = Arc::new(Mutex::new(Tally::new()?));
         let mut members = JoinSet::new();
         for member in self.members {

@@ -2,6 +2,7 @@
 //! whoever watches.
 
 mod address;
+pub(crate) mod attack;
 mod c_client;
 mod cpu;
 mod error;
@@ -27,7 +28,7 @@ pub(crate) use c_client::CClient;
 pub(crate) use error::FleetError;
 pub(crate) use ledger::Ledger;
 pub(crate) use load::{Answered, Load, Question};
-pub(crate) use member::{Fleet, Working};
+pub(crate) use member::{Fleet, Member, Working};
 pub(crate) use memory::{Trend, resident_bytes};
 pub(crate) use planner::Planner;
 pub(crate) use process::{ANY_PORT, ServerProcess};

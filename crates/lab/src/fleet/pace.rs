@@ -12,6 +12,8 @@ pub(crate) struct Pace {
     time: Duration,
     /// Operations a second; none: each is due when the one before is done.
     rate: Option<f64>,
+    /// True where operations that are late by a whole period are left out.
+    skips: bool,
     first: u64,
     next: AtomicU64,
 }
@@ -28,7 +30,12 @@ pub(crate) struct Due {
 impl Pace {
     /// A pace that begins now with the number `first`, and ends after `time`.
     pub(crate) fn new(rate: Option<f64>, time: Duration, first: u64) -> Self {
-        Self { start: Instant::now(), time, rate, first, next: AtomicU64::new(first) }
+        Self { start: Instant::now(), time, rate, skips: false, first, next: AtomicU64::new(first) }
+    }
+
+    /// The same pace, which leaves out what is late by a whole period: the next operation is the newest that is due.
+    pub(crate) fn skipping(self) -> Self {
+        Self { skips: true, ..self }
     }
 
     /// Returns the next number.
@@ -38,6 +45,10 @@ impl Pace {
 
     /// Waits until an operation is due; none when the time is over.
     pub(crate) async fn due(&self) -> Option<Due> {
+        if let Some(rate) = self.rate.filter(|_| self.skips) {
+            let newest = self.first + (self.start.elapsed().as_secs_f64() * rate) as u64;
+            self.next.fetch_max(newest, Ordering::Relaxed);
+        }
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         let since = match self.rate {
             Some(rate) => self.start + Duration::from_secs_f64((number - self.first) as f64 / rate),
@@ -71,5 +82,16 @@ mod tests {
             assert!(pace.due().await.is_some());
         }
         assert!(pace.due().await.is_none());
+    }
+
+    #[tokio::test]
+    async fn who_skips_is_never_late_by_a_whole_period() {
+        let pace = Pace::new(Some(100.0), Duration::from_secs(60), 7).skipping();
+        assert_eq!(pace.due().await.unwrap().number, 7);
+        tokio::time::sleep(Duration::from_millis(55)).await;
+        let before = Instant::now();
+        let late = pace.due().await.unwrap();
+        assert!(late.number >= 12, "{late:?}");
+        assert!(before.saturating_duration_since(late.since) <= Duration::from_millis(10), "{late:?}");
     }
 }

@@ -70,6 +70,16 @@ impl ServerProcess {
         Self::launch(Command::new(own_program()?), data_dir, grpc, settings).await
     }
 
+    /// Starts `program`, this one where none is given, as a server with more settings.
+    pub(crate) async fn start_program(
+        program: Option<&Path>,
+        data_dir: &Path,
+        settings: &[(&str, &str)],
+    ) -> Result<Self, FleetError> {
+        let program = program.map_or_else(own_program, |program| Ok(program.to_owned()))?;
+        Self::launch(Command::new(program), data_dir, ANY_PORT, settings).await
+    }
+
     async fn launch(
         mut command: Command,
         data_dir: &Path,
@@ -142,7 +152,7 @@ impl ServerProcess {
 }
 
 /// This program.
-fn own_program() -> Result<PathBuf, FleetError> {
+pub(super) fn own_program() -> Result<PathBuf, FleetError> {
     std::env::current_exe().map_err(|error| no_server(&error))
 }
 

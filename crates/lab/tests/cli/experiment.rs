@@ -140,3 +140,39 @@ fn odometry_is_found_beside_the_scans_and_left_out_where_there_is_none() {
     assert_eq!(texts(&lines, "map")[4], "odometry");
     assert!(lines[4]["error_m"]["max"].as_f64().unwrap() < 1e-9, "{}", lines[4]);
 }
+
+#[test]
+fn an_attack_tells_what_each_honest_caller_waited_for_and_what_became_of_each_attack() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let attacks = ["poses", "listings", "tiny-scans", "connections", "watches"];
+    let short = ["experiment", "attack", "--seconds", "4", "--alone-seconds", "2", "--site-voxels", "2000"];
+    let names = attacks.join(",");
+    // What else the machine does is no fault of the server.
+    let goals = ["--times-max", "1e9", "--p99-max-s", "1e9", "--livez-max-ms", "1e9"];
+    let lines = objects(&[&short[..], &["--attacks", &names, "--out", out], &goals].concat());
+    let (callers, attackers) = lines.split_at(6);
+    assert_eq!(texts(attackers, "attack"), attacks);
+    // A connection that is left alone is one for longer than this lasts.
+    for line in attackers.iter().filter(|line| line["attack"] != "connections") {
+        assert!(number(line, "answered") + number(line, "refused") > 0.0, "{line}");
+    }
+    for line in callers {
+        assert_eq!(
+            [&line["alone"], &line["attacked"]].map(|phase| number(phase, "errors")),
+            [0.0; 2],
+            "{line}"
+        );
+        assert!(number(&line["attacked"], "requests") >= 1.0 && number(line, "times_p99") > 0.0, "{line}");
+    }
+    let rows = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap().lines().count();
+    assert_eq!(["attack.csv", "attack.md", "attackers.csv"].map(rows), [1 + 12, 2 + 12, 1 + 5]);
+}
+
+#[test]
+fn an_attack_whose_goals_are_missed_says_which() {
+    let short = ["experiment", "attack", "--seconds", "1", "--alone-seconds", "1", "--site-voxels", "2000"];
+    let complaint =
+        complaint(&[&short[..], &["--attacks", "connections", "--livez-max-ms", "0"]].concat(), 1);
+    assert!(complaint.contains("/livez: p99.9 is") && complaint.contains("--livez-max-ms 0"), "{complaint}");
+}

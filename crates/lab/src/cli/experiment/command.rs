@@ -3,10 +3,12 @@
 use clap::Subcommand;
 
 use super::{
-    carving, convergence, deskewing, free_space, lookup, mapping, rounds, scaling, simulation, verdicts,
+    attack, carving, convergence, deskewing, free_space, lookup, mapping, rounds, scaling, simulation,
+    verdicts,
 };
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
+use mrol::console::runtime;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -24,6 +26,7 @@ EXAMPLES:
   mrol-lab experiment carving                      what a map loses of what is taken away, and keeps of what stands
   mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
+  mrol-lab experiment attack --seconds 120         what honest callers wait for while others ask for all they can
   mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
                                                wrong poses accepted and right ones refused; simulated places too
 
@@ -39,6 +42,7 @@ pub(in crate::cli) struct Experiment {
 
 #[derive(Debug, Subcommand)]
 enum Which {
+    Attack(attack::AttackExperiment),
     Carving(carving::Carving),
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
@@ -54,6 +58,7 @@ enum Which {
 impl Experiment {
     pub(in crate::cli) fn run(self, output: Output) -> Result<(), CliError> {
         match self.which {
+            Which::Attack(attack) => runtime::block_on(attack.run(output)),
             Which::Carving(carving) => carving.run(&output),
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),

@@ -1,5 +1,6 @@
 //! `mrol-lab experiment`: repeats the paper's experiments, with plots and tables as results.
 
+mod attack;
 mod carving;
 mod command;
 mod convergence;
@@ -12,4 +13,5 @@ mod scaling;
 mod simulation;
 mod verdicts;
 
+pub(in crate::cli) use attack::Attackers;
 pub(in crate::cli) use command::Experiment;
