@@ -159,13 +159,17 @@ impl MapService {
                 Some(thread) => thread,
                 None => lane.thread(requester).await?,
             };
-            match lane.run_on(thread, submit.clone()).await?? {
+            let step = lane.run_on(thread, submit.clone()).await??;
+            match step {
                 Step::Answered(answer) => return Ok(answer),
-                Step::Submitted(outcome, answer) => match self.outcome_of(operation, map, outcome).await? {
-                    Ok(committed) => return Ok(answer(committed)),
-                    Err(Refusal::Failed(error)) => return Err(error),
-                    Err(Refusal::Stale) => {}
-                },
+                Step::Ready(submission, answer) => {
+                    let outcome = map.commit_queue.submit(requester, submission)?;
+                    match self.outcome_of(operation, map, outcome).await? {
+                        Ok(committed) => return Ok(answer(committed)),
+                        Err(Refusal::Failed(error)) => return Err(error),
+                        Err(Refusal::Stale) => {}
+                    }
+                }
             }
         }
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::commit::{Decided, Submission};
 use super::map_service::MapService;
+use super::work::{Asker, Requester};
 use mrol_map::map::{Change, MapName, MultiResolutionMap};
 
 impl MapService {
@@ -15,7 +16,11 @@ impl MapService {
         let map = self.map(map).expect("a map of that name");
         let decided = Decided { change, record: None, lent: Vec::new(), pin: None };
         let submission = Submission::Undecided(Box::new(|_, _| Ok(Some(decided))));
-        let outcome = map.commit_queue.submit(submission).expect("room in the queue").await;
+        let outcome = map
+            .commit_queue
+            .submit(&Requester::from(&Asker::default()), submission)
+            .expect("room in the queue")
+            .await;
         outcome.expect("an outcome").expect("a change").revision
     }
 

@@ -48,7 +48,7 @@ impl MapService {
             let of = Arc::clone(&map);
             let submit = move |stop: StopSignal<'_>| {
                 let submit = |stop: StopSignal<'_>| {
-                    map.submit_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
+                    map.prepare_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
                 };
                 if reads_journal { limit.run(stop, submit) } else { submit(stop) }
             };
@@ -63,8 +63,8 @@ impl MapService {
 }
 
 impl HostedMap {
-    /// Sets a deletion on its way, unless it was done before.
-    pub(crate) fn submit_deletion(
+    /// Prepares a deletion, unless it was done before.
+    pub(crate) fn prepare_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
         caller: Option<&CallerName>,
@@ -78,7 +78,8 @@ impl HostedMap {
             caller: caller.cloned(),
         });
         let former = former_digest(deletion);
-        if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
+        let answered = self.answered(RequestKind::Deletion, request.as_ref(), former)?;
+        if let Some(answered) = answered {
             let version = self.version_at(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.removed, version, replayed: true }));
         }
@@ -106,14 +107,13 @@ impl HostedMap {
             let change = Change::Deletion(DeletionRecord { voxels, request });
             Ok(Some(Decided { change, record: None, lent, pin: None }))
         };
-        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |committed: Committed| DeletionAnswer {
             removed: committed.removed,
             version: map.version(committed.version()),
             replayed: false,
         };
-        Ok(Step::Submitted(outcome, Box::new(answer)))
+        Ok(Step::Ready(Submission::Undecided(Box::new(decide)), Box::new(answer)))
     }
 
     fn targets_of(&self, deletion: &Deletion, stop: StopSignal<'_>) -> Result<VoxelSet, ServiceError> {

@@ -76,7 +76,7 @@ impl MapService {
         let (inner, record) = (Arc::clone(&self.inner), KeepOutRecord { change, request });
         let of = Arc::clone(&map);
         let submit = move |_: StopSignal<'_>| {
-            map.submit_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
+            map.prepare_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
         };
         let lane = (&self.inner.lanes.mapping, &Requester::from(&self.asker));
         self.submit_and_wait(("ChangeKeepOut", &of), lane, None, submit).await
@@ -84,8 +84,8 @@ impl MapService {
 }
 
 impl HostedMap {
-    /// Sets a keep-out's change on its way, unless it was made before.
-    fn submit_keep_out(
+    /// Prepares a keep-out's change, unless it was made before.
+    fn prepare_keep_out(
         self: &Arc<Self>,
         record: &KeepOutRecord,
         limits: &Limits,
@@ -93,7 +93,8 @@ impl HostedMap {
         now_ns: i64,
     ) -> Result<Step<KeepOutAnswer>, ServiceError> {
         self.check_writable()?;
-        if let Some(answered) = self.keep_out_answered(record.request.as_ref())? {
+        let answered = self.keep_out_answered(record.request.as_ref())?;
+        if let Some(answered) = answered {
             let version = self.version_at(answered);
             return Ok(Step::Answered(KeepOutAnswer { version, replayed: true }));
         }
@@ -108,13 +109,12 @@ impl HostedMap {
             map.check_keep_out(&core.keep_outs(), &record.change, most)?;
             Ok(Some(decided(record)))
         };
-        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |committed: Committed| KeepOutAnswer {
             version: map.version(committed.version()),
             replayed: false,
         };
-        Ok(Step::Submitted(outcome, Box::new(answer)))
+        Ok(Step::Ready(Submission::Undecided(Box::new(decide)), Box::new(answer)))
     }
 
     /// The revision that the same request made before.

@@ -9,6 +9,7 @@ use crate::error::ServiceError;
 use crate::map_service::{MapService, commit_thread_ended};
 use crate::maps::HostedMap;
 use crate::resources::ResourceBudget;
+use crate::work::{Asker, Requester};
 use mrol_map::map::{KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOuts, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 
@@ -75,7 +76,9 @@ impl HostedMap {
             true => Ok(Some(decided(KeepOutRecord { change, request: None }))),
             false => Err(Refusal::Stale),
         };
-        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
+        let outcome = self
+            .commit_queue
+            .submit(&Requester::from(&Asker::default()), Submission::Undecided(Box::new(decide)))?;
         match outcome.await.map_err(commit_thread_ended)? {
             Ok(committed) => {
                 let (map, revision) = (&self.name, committed.revision);

@@ -78,7 +78,7 @@ impl MapService {
             let _robot = map.lock_robot_of(&undo.target).await;
             let of = Arc::clone(&map);
             self.submit_and_wait(("Undo", &of), (lane, &requester), Some(thread), move |stop| {
-                limit.run(stop, |stop| map.submit_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
+                limit.run(stop, |stop| map.prepare_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
             })
             .await
         };
@@ -102,11 +102,11 @@ impl HostedMap {
         }
     }
 
-    /// Sets an undo on its way, unless it was done before.
+    /// Prepares an undo, unless it was done before.
     ///
     /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
     /// nobody else can change the map.
-    pub(super) fn submit_undo(
+    pub(super) fn prepare_undo(
         self: &Arc<Self>,
         undo: &Undo,
         caller: Option<&CallerName>,
@@ -121,7 +121,8 @@ impl HostedMap {
             caller: caller.cloned(),
         });
         let former = former_digest(&undo.target);
-        if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
+        let answered = self.answered(RequestKind::Undo, request.as_ref(), former)?;
+        if let Some(answered) = answered {
             let CompletedRequest { scans, deletions, removed, restored, revision, .. } = answered;
             let version = self.version_at(revision);
             let answer = UndoAnswer { scans, deletions, removed, restored, version, replayed: true };
@@ -148,7 +149,6 @@ impl HostedMap {
             // What came meanwhile is shown while the map waits: that ends with the request's time as well.
             Ok(Some(limit.run(stop, |stop| planned.decided(&map, &folder, stop))?))
         };
-        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |committed: Committed| UndoAnswer {
             scans,
@@ -158,7 +158,7 @@ impl HostedMap {
             version: map.version(committed.version()),
             replayed: false,
         };
-        Ok(Step::Submitted(outcome, Box::new(answer)))
+        Ok(Step::Ready(Submission::Undecided(Box::new(decide)), Box::new(answer)))
     }
 
     /// What undoing `targets` does, as the map is now: what takes long is done here, on a thread of its own.

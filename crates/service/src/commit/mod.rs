@@ -3,7 +3,7 @@
 //! ```text
 //! many threads                one thread a map
 //!
-//! align, quantize, encode --> take all that wait
+//! align, quantize, encode --> take those that wait, in turns of callers, then of robots
 //!                             append to the journal   they take their revisions here
 //!                             sync                    once for all of them
 //!                             apply                   in the order of revisions
@@ -13,7 +13,7 @@
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
 //! before it is applied and nothing after it has begun.
 //!
-//! A [`Submission`] goes into the [`CommitQueue`] of its map; the `worker` takes it out, journals it, applies it and
+//! A [`Submission`] goes into the [`CommitQueue`] of its map, where `turns` orders it; the `worker` takes it out, journals it, applies it and
 //! publishes it to [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn
 //! comes.
 
@@ -22,6 +22,7 @@ mod recent_changes;
 mod scan_turn;
 mod stop;
 mod submission;
+mod turns;
 mod watched_change;
 mod worker;
 

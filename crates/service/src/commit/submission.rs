@@ -7,6 +7,7 @@ use tokio::sync::{OwnedMutexGuard, oneshot};
 use super::scan_turn::TurnLimits;
 use crate::error::{Reason, ServiceError};
 use crate::resources::Reservation;
+use crate::work::{Requester, Share};
 use mrol_map::map::{Change, Committed, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 use mrol_store::{Pin, Record};
@@ -68,18 +69,22 @@ impl From<ServiceError> for Refusal {
 
 pub(super) type Outcome = Result<Committed, Refusal>;
 
-/// A request that is answered, or on its way into the map.
+/// A request that is answered, or ready to go into the map.
 pub(crate) enum Step<A> {
     /// The request changes nothing, or was done before: its answer.
     Answered(A),
-    /// What becomes of it will be known, and then what to say.
-    Submitted(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
+    /// The change to be made, and what to say once it is.
+    Ready(Submission, Box<dyn FnOnce(Committed) -> A + Send>),
 }
 
 /// A submission with the one who waits for it.
 pub(super) struct Waiting {
     pub(super) submission: Submission,
     pub(super) answer: oneshot::Sender<Outcome>,
+    /// Whose turn it takes.
+    pub(super) requester: Requester,
+    /// Its place in the queue; none of what the process itself waits for.
+    pub(super) _place: Option<Share>,
 }
 
 /// Closures have no form to print.

@@ -11,6 +11,7 @@ use super::stop::{Stop, outcome_unknown, revisions_used_up};
 use super::submission::{
     Decided, Decision, Outcome, Prepared, Refusal, RobotLock, Submission, Waiting, record_of,
 };
+use super::turns::Turns;
 use super::watched_change::WatchedChange;
 use crate::error::ServiceError;
 use crate::resources::Reservation;
@@ -19,7 +20,7 @@ use mrol_map::sync::mpsc::{Receiver, RecvTimeoutError};
 use mrol_map::util::{SharedDurations, StopSignal};
 use mrol_store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 
-/// Changes that share one sync, and as many that wait meanwhile; one more is refused.
+/// Changes that share one sync, at most.
 pub(super) const GROUP_MAX: usize = 256;
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
@@ -75,16 +76,17 @@ impl Worker {
 
     /// Makes changes until nobody can send one any more.
     pub(super) fn run(mut self, inbox: &Receiver<Waiting>) {
+        let mut turns = Turns::default();
         loop {
-            match self.next(inbox) {
-                Ok(first) => {
-                    let rest = inbox.try_iter().take(GROUP_MAX - 1);
-                    let waiting: Vec<Waiting> = std::iter::once(first).chain(rest).collect();
-                    self.commit(waiting);
+            if turns.is_empty() {
+                match self.next(inbox) {
+                    Ok(first) => turns.push(first),
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
                 }
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
             }
+            inbox.try_iter().for_each(|waiting| turns.push(waiting));
+            self.commit(turns.group(GROUP_MAX));
             self.sync_if_due();
         }
         self.sync();
@@ -100,7 +102,7 @@ impl Worker {
     /// Makes the changes that wait, in order; a run of known ones shares one sync.
     fn commit(&mut self, waiting: Vec<Waiting>) {
         let mut group = Vec::new();
-        for Waiting { submission, answer } in waiting {
+        for Waiting { submission, answer, .. } in waiting {
             match submission {
                 Submission::Prepared(prepared) => {
                     let Prepared { mut change, mut record, if_empty, limits, robot_lock, reservation } =

@@ -70,7 +70,7 @@ impl MapService {
                 limit.run(stop, |stop| {
                     let robot_lock = Arc::clone(&robot_lock);
                     map.check_robots_of(&asker, &scan.robot, &inner.settings.limits)?;
-                    map.submit_scan(&scan, robot_lock, effort, &inner.settings, &inner.budget, stop)
+                    map.prepare_scan(&scan, robot_lock, effort, &inner.settings, &inner.budget, stop)
                 })
             }
         };

@@ -40,9 +40,9 @@ pub(crate) enum Effort {
 }
 
 impl HostedMap {
-    /// Aligns the scan, and where it fits sets it on its way into the map. Its answer is none where one start is not
+    /// Aligns the scan, and where it fits prepares it for the map. Its answer is none where one start is not
     /// enough.
-    pub(crate) fn submit_scan(
+    pub(crate) fn prepare_scan(
         self: &Arc<Self>,
         request: &ScanRequest,
         robot_lock: RobotLock,
@@ -53,7 +53,8 @@ impl HostedMap {
     ) -> Result<Step<Option<Judged>>, ServiceError> {
         self.check_writable()?;
         let scan = FilteredScan::of(request, settings)?;
-        if let Some(answer) = self.replay(&scan)? {
+        let replayed = self.replay(&scan)?;
+        if let Some(answer) = replayed {
             return Ok(Step::Answered(Some(Judged { answer, guess: None, sample: Vec::new() })));
         }
         self.check_voxels(settings)?;
@@ -103,10 +104,10 @@ impl HostedMap {
         let limits = TurnLimits { carved_at, viewpoint_bytes_max: settings.limits.viewpoint_bytes_max };
         let prepared =
             Prepared { change, record, if_empty: located.is_first, limits, robot_lock, reservation };
-        let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let judged = Judged { answer: ScanAnswer { points_skipped, ..judged.answer }, ..judged };
-        Ok(Step::Submitted(outcome, Box::new(move |committed| Some(map.committed(judged, committed)))))
+        let answer = move |committed| Some(map.committed(judged, committed));
+        Ok(Step::Ready(Submission::Prepared(prepared.into()), Box::new(answer)))
     }
 
     /// What to say of a scan that was committed.
@@ -124,7 +125,7 @@ impl HostedMap {
         Judged { answer, guess, sample }
     }
 
-    /// Says what [`HostedMap::submit_scan`] would; changes nothing.
+    /// Says what [`HostedMap::prepare_scan`] would; changes nothing.
     pub(crate) fn align_scan(
         &self,
         request: &ScanRequest,

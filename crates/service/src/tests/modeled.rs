@@ -20,6 +20,7 @@ use crate::request::{Deletion, DeletionTarget, ScanRequest};
 use crate::resources::ResourceBudget;
 use crate::scan::Effort;
 use crate::settings::ServiceSettings;
+use crate::work::{Asker, Requester};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap, Region, RobotName};
 use mrol_map::mapping::Guess;
@@ -56,17 +57,19 @@ fn insert_three(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>, robot: &str,
         };
         let robot_lock = Arc::new(block_on(map.robots.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
-        let step = map.submit_scan(&request, robot_lock, Effort::Whole, &settings, budget, StopSignal::NEVER);
-        newest = outcome(step).unwrap().expect("a scan at its guess").answer.version.revision;
+        let step =
+            map.prepare_scan(&request, robot_lock, Effort::Whole, &settings, budget, StopSignal::NEVER);
+        newest = outcome(map, step).unwrap().expect("a scan at its guess").answer.version.revision;
     }
     newest
 }
 
 /// What becomes of a change, when it is visible.
-fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
+fn outcome<A>(map: &HostedMap, step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
+    let requester = Requester::from(&Asker::default());
     match step? {
         Step::Answered(answer) => Ok(answer),
-        Step::Submitted(outcome, answer) => match block_on(outcome) {
+        Step::Ready(submission, answer) => match block_on(map.commit_queue.submit(&requester, submission)?) {
             Ok(Ok(committed)) => Ok(answer(committed)),
             Ok(Err(_)) | Err(_) => Err(ServiceError::overloaded("refused")),
         },
@@ -76,7 +79,7 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
 fn delete_everything(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
-    outcome(map.submit_deletion(&Arc::new(deletion), None, budget, StopSignal::NEVER))
+    outcome(map, map.prepare_deletion(&Arc::new(deletion), None, budget, StopSignal::NEVER))
         .unwrap()
         .version
         .revision

@@ -47,9 +47,9 @@ impl Display for Asker {
 /// Whose turn a job takes: an asker takes turns with other askers, and each of its robots with its other robots.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Requester {
-    pub(in crate::work) asker: Asker,
+    pub(crate) asker: Asker,
     /// None of requests that are of no robot, which take turns with the asker's robots as one of them.
-    pub(in crate::work) robot: Option<RobotName>,
+    pub(crate) robot: Option<RobotName>,
 }
 
 impl From<&Asker> for Requester {

@@ -46,7 +46,7 @@ pub(crate) struct Lane {
     /// Who gets a thread that has no job.
     queue: FairQueue,
     /// Callers that wait for their robot or their map to be free.
-    waiting_for_locks: Shares,
+    waiting_for_locks: Arc<Shares>,
     jobs_waiting_max: usize,
     /// What its jobs take precedence as, over other lanes.
     precedence: Option<Precedence>,
@@ -91,7 +91,7 @@ impl Lane {
             name,
             threads: Threads::start(name, threads, niceness)?.into(),
             queue: FairQueue::new(threads, waiting_max, paused_max),
-            waiting_for_locks: Shares::new(waiting_max),
+            waiting_for_locks: Arc::new(Shares::new(waiting_max)),
             jobs_waiting_max: waiting_max,
             precedence: None,
             counts: Arc::default(),

@@ -1,6 +1,6 @@
 //! The threads of a lane that are free, and who waits for one.
 //!
-//! Askers take turns, and the robots of an asker among themselves, as [`row`] says: so who asks one question waits for
+//! Askers take turns, and the robots of an asker among themselves, as the [`Row`](super::row::Row) says: so who asks one question waits for
 //! about one question of somebody who asks many. What one robot asks is begun in order. Long work gives its thread back
 //! between its parts where somebody else waits, and is first of its own requester's when their turn comes again.
 //!
@@ -8,7 +8,6 @@
 //! last of them: whoever asks much is refused, and not whoever comes late.
 
 mod queue;
-mod row;
 #[cfg(test)]
 mod tests;
 

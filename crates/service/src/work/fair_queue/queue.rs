@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use parking_lot::Mutex;
 use tokio::sync::oneshot::{self, Receiver, Sender};
 
-use super::row::{Member, Row, TURN};
 use crate::work::asker::{Asker, Requester};
 use crate::work::precedence::Precedence;
+use crate::work::row::{Member, Row, TURN};
 use mrol_map::map::RobotName;
 
 /// Work of this long and longer is charged twice what the shortest is.

@@ -6,13 +6,13 @@
 //! anew is charged almost as for a turn, so that newcomers, however many they are, overtake nobody for long.
 
 /// What every turn is charged.
-pub(super) const TURN: u64 = 1000;
+pub(crate) const TURN: u64 = 1000;
 /// What who comes anew is charged: less than those who have had a turn.
 const NEWCOMER: u64 = TURN - 1;
 
 /// Those who have turns or wait for one, and for a while those who had one.
 #[derive(Debug)]
-pub(super) struct Row<Id, Of> {
+pub(crate) struct Row<Id, Of> {
     members: Vec<Member<Id, Of>>,
     /// The charge of the newest turn, before it.
     now: u64,
@@ -21,13 +21,13 @@ pub(super) struct Row<Id, Of> {
 
 /// One of those who take turns, and what it waits for.
 #[derive(Debug)]
-pub(super) struct Member<Id, Of> {
-    pub(super) id: Id,
-    pub(super) of: Of,
+pub(crate) struct Member<Id, Of> {
+    pub(crate) id: Id,
+    pub(crate) of: Of,
     /// Turns in hand.
-    pub(super) running: usize,
+    pub(crate) running: usize,
     /// Jobs that wait for a turn.
-    pub(super) waiting: usize,
+    pub(crate) waiting: usize,
     charge: u64,
     /// When its last turn was, or when it came.
     last: u64,
@@ -40,16 +40,16 @@ impl<Id, Of> Default for Row<Id, Of> {
 }
 
 impl<Id: PartialEq + Clone, Of: Default> Row<Id, Of> {
-    pub(super) fn members(&self) -> &[Member<Id, Of>] {
+    pub(crate) fn members(&self) -> &[Member<Id, Of>] {
         &self.members
     }
 
-    pub(super) fn find(&mut self, id: &Id) -> Option<&mut Member<Id, Of>> {
+    pub(crate) fn find(&mut self, id: &Id) -> Option<&mut Member<Id, Of>> {
         self.members.iter_mut().find(|member| member.id == *id)
     }
 
     /// The one of this name, who joins the row where it is not there.
-    pub(super) fn join(&mut self, id: &Id) -> &mut Member<Id, Of> {
+    pub(crate) fn join(&mut self, id: &Id) -> &mut Member<Id, Of> {
         let known = self.members.iter().position(|member| member.id == *id);
         let at = known.unwrap_or_else(|| {
             self.turns += 1;
@@ -62,13 +62,13 @@ impl<Id: PartialEq + Clone, Of: Default> Row<Id, Of> {
     }
 
     /// Whose turn is next, of those who wait and `may` have one.
-    pub(super) fn next(&self, may: impl Fn(&Member<Id, Of>) -> bool) -> Option<&Member<Id, Of>> {
+    pub(crate) fn next(&self, may: impl Fn(&Member<Id, Of>) -> bool) -> Option<&Member<Id, Of>> {
         let waiting = self.members.iter().filter(|member| member.waiting > 0 && may(member));
         waiting.min_by_key(|member| (member.running, member.charge, member.last))
     }
 
     /// Gives a turn to one of the row, which need not have waited.
-    pub(super) fn begin(&mut self, id: &Id) {
+    pub(crate) fn begin(&mut self, id: &Id) {
         self.turns += 1;
         let (turns, now) = (self.turns, self.now);
         let member = self.join(id);
@@ -79,7 +79,7 @@ impl<Id: PartialEq + Clone, Of: Default> Row<Id, Of> {
     }
 
     /// Ends a turn, which costs `extra` besides.
-    pub(super) fn end(&mut self, id: &Id, extra: u64) {
+    pub(crate) fn end(&mut self, id: &Id, extra: u64) {
         if let Some(member) = self.find(id) {
             member.running -= 1;
             member.charge += extra.min(TURN);
@@ -88,7 +88,7 @@ impl<Id: PartialEq + Clone, Of: Default> Row<Id, Of> {
     }
 
     /// Forgets those who have nothing and wait for nothing, once others have been charged as much.
-    pub(super) fn forget_idle(&mut self) {
+    pub(crate) fn forget_idle(&mut self) {
         let is_idle = |member: &Member<Id, Of>| member.running == 0 && member.waiting == 0;
         if self.members.iter().all(is_idle) {
             self.members.clear();
