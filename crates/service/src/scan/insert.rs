@@ -78,10 +78,11 @@ impl MapService {
         if let Some(judged) = self.submit_and_wait(of, (mapping, &requester), None, at_first).await? {
             return Ok(judged);
         }
-        // What keeps failing gives way to what may succeed.
-        let thread = limit.wait(long_mapping.thread(&requester)).await??;
-        let lane = (long_mapping, &requester);
-        let judged = self.submit_and_wait(of, lane, Some(thread), submit(Effort::Whole)).await;
+        // What keeps failing gives way to what may succeed: its threads are nice, and while others have work they hardly
+        // run. A robot of which a scan takes long now and then waits for turns, and not for idle cores.
+        let lane = if long_mapping.is_failing(&requester) { long_mapping } else { mapping };
+        let thread = limit.wait(lane.thread(&requester)).await??;
+        let judged = self.submit_and_wait(of, (lane, &requester), Some(thread), submit(Effort::Whole)).await;
         long_mapping.note(
             &requester,
             judged.as_ref().is_ok_and(|judged| judged.as_ref().is_some_and(|judged| judged.answer.accepted)),
@@ -147,6 +148,28 @@ mod tests {
             ("one", "r3", Ok(true)),
         ] {
             assert_eq!(send(asker, robot).await, told, "{robot} of {asker}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_long_scan_takes_a_turn_in_mapping_until_such_scans_keep_failing() {
+        let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let map = MapName::new("a").unwrap();
+        service.create_map(map.clone(), MapSettings::new(0.1, 3)).await.unwrap();
+        let wall =
+            |x: f32| (0..3000).map(move |n| Point::new(x, (n % 60) as f32 * 0.05, (n / 60) as f32 * 0.05));
+        let send = async |robot: &str, points: Vec<Point>, at_guess: bool| {
+            let mut scan = ScanRequest::new(RobotName::new(robot).unwrap(), points.into());
+            (scan.guess, scan.at_guess) = (Guess::Pose(Pose::identity()), at_guess);
+            service.insert_scan(&map, scan).await.unwrap().accepted
+        };
+        assert!(send("honest", wall(2.0).collect(), true).await);
+        let begun = |name: &str| service.lanes().into_iter().find(|lane| lane.name == name).unwrap().begun;
+        // What fits nowhere near needs more starts.
+        for (failures, nice) in [(0, 0), (1, 0), (2, 0), (3, 1), (4, 2)] {
+            let before = begun("mapping");
+            assert!(!send("garbage", wall(-7.0).collect(), false).await, "after {failures}");
+            assert_eq!((begun("mapping") - before, begun("long_mapping")), (2 - u64::from(nice > 0), nice));
         }
     }
 }

@@ -208,6 +208,11 @@ impl Lane {
         answered.await.map_err(|_| failed())
     }
 
+    /// True of a requester whose work keeps failing, as was noted.
+    pub(crate) fn is_failing(&self, requester: &Requester) -> bool {
+        self.failures.is_failing(requester)
+    }
+
     /// Notes whether the work of a requester came to something: what keeps failing takes shorter parts of the turns.
     pub(crate) fn note(&self, requester: &Requester, succeeded: bool) {
         self.failures.note(requester, succeeded);

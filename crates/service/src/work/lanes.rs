@@ -35,8 +35,8 @@ pub(crate) struct Lanes {
     pub(crate) messages: Lane,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     pub(crate) mapping: Lane,
-    /// For scans that take long, since they do not fit from their guess: a second and more each, while robots whose
-    /// scans fit map on.
+    /// For scans that take long, a second and more each, of robots and keys whose long scans keep failing: while robots
+    /// whose scans fit map on, it hardly runs. A scan that takes long now and then stays in `mapping`, and gives way there.
     pub(crate) long_mapping: Lane,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     pub(crate) alignment: Lane,
