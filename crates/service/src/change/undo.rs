@@ -106,7 +106,7 @@ impl HostedMap {
     ///
     /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
     /// nobody else can change the map.
-    pub(super) fn prepare_undo(
+    pub(crate) fn prepare_undo(
         self: &Arc<Self>,
         undo: &Undo,
         caller: Option<&CallerName>,

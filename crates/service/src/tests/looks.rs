@@ -1,18 +1,23 @@
 //! How often the service's long operations look at their stop signal.
 
 use std::cell::Cell;
+use std::time::Duration;
 
 use uuid::Uuid;
 
-use crate::commit::CommitThread;
+use crate::commit::{CommitThread, Step};
 use crate::error::{Reason, ServiceError};
 use crate::lifecycle::from_file;
 use crate::limits::{Limits, Marks};
+use crate::map_service::MapService;
 use crate::maps::HostedMap;
-use crate::request::{BlockForm, BlockRequest, ListingRequest, PointCloud, PointQuery, ScanRequest};
+use crate::request::{
+    BlockForm, BlockRequest, ListingRequest, PointCloud, PointQuery, ScanRequest, Undo, UndoTarget,
+};
 use crate::resources::ResourceBudget;
 use crate::scan::LocalizationRequest;
 use crate::settings::ServiceSettings;
+use crate::work::TimeLimit;
 use mrol_map::align::localize::LocalizationQuery;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{
@@ -20,9 +25,9 @@ use mrol_map::map::{
     ScanRecord,
 };
 use mrol_map::mapping::Guess;
-use mrol_map::util::StopSignal;
+use mrol_map::util::{GiveWay, StopSignal};
 use mrol_map::voxel::VoxelKey;
-use mrol_store::StoreSettings;
+use mrol_store::{OpeningProgress, StoreSettings};
 
 fn wall(count: usize) -> Vec<Point> {
     (0..count).map(|i| Point::new((i % 97) as f32 * 0.05, 2.0, (i / 97 % 89) as f32 * 0.05)).collect()
@@ -114,7 +119,7 @@ fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
     let request = LocalizationRequest {
         points: PointCloud::from(wall(10_000)),
         query: LocalizationQuery { candidates: 1, ..LocalizationQuery::default() },
-        time_limit: Some(std::time::Duration::ZERO),
+        time_limit: Some(Duration::ZERO),
     };
     let answer = map.localize(&request, &settings, &budget, StopSignal::NEVER).unwrap();
     assert!(answer.cut_short && !answer.accepted() && answer.candidates.is_empty());
@@ -202,4 +207,42 @@ fn a_block_and_a_count_are_made_with_looks_in_proportion_to_the_map_and_given_up
             assert_eq!(work(StopSignal::when(&gone)).unwrap_err().reason, Reason::CallerGone);
         }
     }
+}
+
+/// Counts how often work would let other work go first.
+#[derive(Default)]
+struct Counted(Cell<usize>);
+
+impl GiveWay for Counted {
+    fn give_way(&self) {
+        self.0.set(self.0.get() + 1);
+    }
+
+    fn paused_for(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+#[tokio::test]
+async fn an_undo_gives_way_before_each_change_that_it_reads() {
+    const SCANS: usize = 20;
+    let folder = tempfile::tempdir().unwrap();
+    let settings = ServiceSettings { data_dir: Some(folder.path().into()), ..ServiceSettings::default() };
+    let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+    let name = MapName::new("a").unwrap();
+    service.create_map(name.clone(), MapSettings::new(0.1, 1)).await.unwrap();
+    for n in 0..SCANS {
+        let points = vec![Point::new(n as f32 + 0.05, 0.05, 0.05)].into();
+        let (guess, at_guess) = (Guess::Pose(Pose::identity()), true);
+        let scan = ScanRequest { guess, at_guess, ..ScanRequest::new(robot(), points) };
+        service.insert_scan(&name, scan).await.unwrap();
+    }
+    let map = service.map(&name).unwrap();
+    let undo = Undo { target: UndoTarget::RobotSince { robot: robot(), revision: 0 }, request_id: None };
+    let (budget, turns) = (ResourceBudget::new(None, Marks::default()), Counted::default());
+    let limit = TimeLimit::new("undo_time_max", 3600.0);
+    let stop = StopSignal::NEVER.giving_way_by(&turns);
+    assert!(matches!(map.prepare_undo(&undo, None, &budget, &limit, stop), Ok(Step::Ready(..))));
+    // Those that are undone, and all since the snapshot before them.
+    assert!(turns.0.get() >= 2 * SCANS, "{}", turns.0.get());
 }

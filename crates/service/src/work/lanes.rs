@@ -90,7 +90,7 @@ impl Lanes {
             alignment: of("alignment", settings.alignment_threads, 0, waiting, PAUSED_MAX)?,
             localization: of("localization", localization_threads, 0, waiting, LARGE_PAUSED_MAX)?,
             recovery: of("recovery", of_searches, NICENESS, long_waiting, LARGE_PAUSED_MAX)?,
-            undo: of("undo", ONE_AT_A_TIME, 0, waiting, 0)?,
+            undo: of("undo", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
             map_files: of("map_file", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
             watch: of("watch", ONE_AT_A_TIME, 0, watches, 0)?,
             observers: of("observers", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,

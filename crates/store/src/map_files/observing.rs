@@ -115,6 +115,7 @@ impl MapFolder {
         let (segments, head) = self.facts.journal();
         let targets = observations.targets().to_vec();
         for change in self.place.read_at(targets, &segments, head) {
+            stop.give_way();
             if stop.is_stopped() {
                 return Err(NotObserved::Stopped);
             }
@@ -133,6 +134,7 @@ impl MapFolder {
         let (segments, head) = self.facts.journal();
         let changes = self.place.read_from(observed.revision + 1, &segments, head);
         for change in changes.take_while(|_| !stop.is_stopped()) {
+            stop.give_way();
             let (revision, change) = change?;
             observed.observations.observe(revision, &change);
             observed.revision = revision;
