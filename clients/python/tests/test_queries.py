@@ -1,11 +1,14 @@
 """Occupancy, classification, listings and blocks."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import mrol
 
 from .support.scenes import HALF_M, room
+from .support.server import Server
 
 
 def test_a_query_tells_each_point_in_the_shape_of_the_points(hall: mrol.Map) -> None:
@@ -111,6 +114,29 @@ def test_the_map_from_above_has_the_walls_and_the_post(hall: mrol.Map) -> None:
     part = hall.grid([[0, 0], [1, 2]])
     assert part.occupied.shape == (20, 10)
     assert part.free is None
+
+
+@pytest.mark.parametrize("tell_unknown", [False, True])
+def test_a_whole_grid_of_tiles_is_the_grid_at_once(hall: mrol.Map, tell_unknown: bool) -> None:
+    # Of 800 cells of a tenth of a meter along x: four tiles.
+    options: dict[str, Any] = {"area": [[-40, -3], [40, 3]], "min_z_m": -1, "max_z_m": 1, "tell_unknown": tell_unknown}
+    tiles: list[tuple[int, int | None]] = []
+    at_once, whole = hall.grid(**options), hall.whole_grid(**options, progress=lambda done, of: tiles.append((done, of)))
+    assert len(tiles) > 1
+    assert tiles[-1] == (len(tiles), len(tiles))
+    assert (whole.version, whole.first_version) == (at_once.version, at_once.version)
+    assert (whole.cell_m, whole.extent_m) == (at_once.cell_m, pytest.approx(at_once.extent_m))
+    for name in ("occupied", "tops_m", "free"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(at_once, name))
+
+
+def test_a_whole_grid_of_nothing_has_no_cells(hall: mrol.Map) -> None:
+    assert hall.whole_grid(min_z_m=50, max_z_m=60).occupied.size == 0
+
+
+def test_a_whole_grid_that_takes_more_memory_than_answers_may_says_so(hall: mrol.Map, server: Server) -> None:
+    with mrol.connect(server.address, answer_bytes_max=10_000) as client, pytest.raises(mrol.BadAnswer, match="larger cells"):
+        client.map(hall.name).whole_grid()
 
 
 def test_observers_are_the_scans_that_touched_a_voxel(empty: mrol.Map) -> None:

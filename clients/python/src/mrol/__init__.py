@@ -41,7 +41,7 @@ from .operations.deletions import Deletion
 from .operations.description import FilterSettings, Level, MapInfo, Sighting, Storage
 from .operations.events import FailedScan, ScanEvent
 from .operations.frontiers import Frontier, Frontiers, FrontierView
-from .operations.grid import Grid
+from .operations.grid import Grid, WholeGrid
 from .operations.keep_outs import KeepOut, KeepOutChange, KeepOuts
 from .operations.localization import Candidate, Localization
 from .operations.motions import Motions
@@ -150,6 +150,7 @@ __all__ = [
     "WatchedScan",
     "WatchedState",
     "WatchedUndo",
+    "WholeGrid",
     "connect",
     "errors",
 ]

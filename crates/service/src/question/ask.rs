@@ -64,7 +64,10 @@ impl MapService {
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
                 let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
-                limit.run(stop, |stop| map.answer_question(&map.questioned(limits), &question, limits, stop))
+                let answer = |stop: StopSignal<'_>| {
+                    map.answer_question(&map.questioned(limits), &question, limits, stop)
+                };
+                limit.run(stop, answer).map_err(|error| with_way_out(error, Q::WAY_OUT))
             };
             self.inner.lanes.planning.run(&self.asker, answer).await?
         };
@@ -100,6 +103,14 @@ impl Inner {
         let answer = map.answer_question(&map.questioned(limits).at_once(), question, limits, stop);
         let has_no_time = matches!(&answer, Err(error) if error.reason == Reason::TimeLimit);
         (!has_no_time).then_some(answer)
+    }
+}
+
+/// The error; where the time is up, it says what to do.
+fn with_way_out(error: ServiceError, way_out: &str) -> ServiceError {
+    match error.reason {
+        Reason::TimeLimit => ServiceError { message: format!("{}: {way_out}", error.message), ..error },
+        _ => error,
     }
 }
 

@@ -57,6 +57,9 @@ impl Question for GridQuestion {
 
     const OPERATION: &'static str = "ProjectGrid";
 
+    const WAY_OUT: &'static str = "ask for the grid in tiles (StreamGrid, POST /v1/maps/{map}/grid/tiles), for larger cells \
+                                   (cell_m) or a smaller area, or raise limits.question_time_max_s";
+
     fn asked(&self) -> &Asked {
         &self.asked
     }
@@ -114,6 +117,31 @@ impl From<GridError> for ServiceError {
             }
             GridError::BandRange { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),
             _ => Self::new(Reason::BadGrid, error.to_string()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map_service::MapService;
+    use crate::settings::ServiceSettings;
+    use mrol_map::map::{MapName, MapSettings};
+    use mrol_store::OpeningProgress;
+
+    #[tokio::test]
+    async fn who_asks_for_a_grid_that_takes_too_long_is_told_of_tiles_cells_and_the_setting() {
+        let limits = Limits { question_time_max_s: 0.0, ..Limits::default() };
+        let settings = ServiceSettings { limits, ..ServiceSettings::default() };
+        let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+        let map = MapName::new("site").unwrap();
+        service.create_map(map.clone(), MapSettings::new(0.1, 1)).await.unwrap();
+        let band_m = [f64::NEG_INFINITY, f64::INFINITY];
+        let scope = GridScope { area: GridArea::Occupied, band_m, cell_m: None, tells_unknown: false };
+        let error = service.ask(&map, GridQuestion { asked: Asked::default(), scope }).await.unwrap_err();
+        assert_eq!(error.reason, Reason::TimeLimit);
+        for way_out in ["StreamGrid", "/grid/tiles", "cell_m", "limits.question_time_max_s"] {
+            assert!(error.message.contains(way_out), "{}", error.message);
         }
     }
 }

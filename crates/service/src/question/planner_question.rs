@@ -18,6 +18,9 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// Its name in the table of operations.
     const OPERATION: &'static str;
 
+    /// What to do where its time is up, for the error.
+    const WAY_OUT: &'static str = "ask about less at once, or raise that setting of limits";
+
     /// What it has in common with others.
     fn asked(&self) -> &Asked;
 

@@ -6,33 +6,18 @@ from contextlib import closing
 from .._arrays import whole_of
 from .._fields import reading
 from .._protobuf import Message
-from .._transport.caller import Body, Caller
+from .._transport.caller import Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
-from ..errors import ArgumentError, BadAnswer, ServerError, excerpt, server_error
+from ..errors import ArgumentError, excerpt
 from ..progress import Progress, Told, checked_progress, progress_of
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
-from .following import SILENCE_MAX_S, exactly, following
+from .following import SILENCE_MAX_S, following
+from .framing import failure_of, next_message
 from .handle import MapHandle, flag_of, level_of, word_of
 from .region import region_parameters
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
-
-LENGTH_BYTES = 4
-
-KINDS = {
-    3: ("invalid_argument", 400),
-    4: ("deadline_exceeded", 504),
-    5: ("not_found", 404),
-    6: ("conflict", 409),
-    7: ("permission_denied", 403),
-    8: ("resource_exhausted", 429),
-    9: ("failed_precondition", 412),
-    13: ("internal", 500),
-    14: ("unavailable", 503),
-    16: ("unauthenticated", 401),
-}
-"""The code and the status of HTTP of each status of gRPC, which a message that ends a watch has."""
 
 
 class WatchOperations(MapHandle):
@@ -119,7 +104,7 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
     states, changes, state_bytes, change_bytes = StateParts(), ChangeParts(), 0, 0
     with caller.stream(request) as body:
         while True:
-            data = _next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
+            data = next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
             with reading("a message of the watch"):
                 message = Message(data)
                 event: WatchEvent | None = None
@@ -141,23 +126,10 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
                 elif message.has(5):
                     event = Heartbeat(Version(message.whole(2), map_uuid))
                 elif message.has(6):
-                    raise _failure(message.message(6))
+                    raise failure_of(message.message(6))
             if isinstance(event, WatchedState):
                 states = StateParts()
             elif isinstance(event, WatchedChange):
                 changes, change_bytes = ChangeParts(), 0
             if event is not None:
                 yield event
-
-
-def _next_message(body: Body, deadline: Deadline, most: int) -> memoryview:
-    length = int.from_bytes(exactly(body, LENGTH_BYTES, deadline), "little")
-    if length > most:
-        raise BadAnswer(f"a message of {length} bytes, more than answer_bytes_max, {most}")
-    return memoryview(exactly(body, length, deadline))
-
-
-def _failure(of: Message) -> ServerError:
-    code, status = KINDS.get(of.whole(1), ("internal", 500))
-    retry_after_s = of.double(4) if of.has(4) else None
-    return server_error(status, code, of.text(2), excerpt(of.text(3)).strip("'\""), retry_after_s)
