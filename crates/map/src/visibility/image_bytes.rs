@@ -1,12 +1,11 @@
 //! The bytes of a range image, as it is stored.
 
 use super::cube_map::CubeMap;
+use super::image_layout::{HEAD_BYTES, stored_bytes};
 use super::nearest_depths::SPACING_MAX;
 use super::range_image::{DEPTH_MAX, NOT_SEEN, RangeImage, Rays};
 use super::tile::{TILE_BYTES, Tile};
 
-/// Bytes of an image before its tiles: how many there are along a side, the unit of depths, and how the rays lay.
-const HEAD_BYTES: usize = 1 + 3 * 4;
 /// Says in an image's first byte that its head tells how the rays lay. The first images did not.
 const TELLS_RAYS: u8 = 0x80;
 /// Says in an image's first byte that a number is behind its head: from where on nothing was met.
@@ -136,14 +135,4 @@ impl Rays {
 fn number_from(bytes: &[u8]) -> Option<(f32, &[u8])> {
     let (number, rest) = bytes.split_first_chunk()?;
     Some((f32::from_le_bytes(*number), rest))
-}
-
-/// Bytes of an image with `kept` tiles where it is stored.
-fn stored_bytes(map: CubeMap, kept: usize) -> usize {
-    HEAD_BYTES + map.tiles_of_all_faces().div_ceil(8) + kept * TILE_BYTES
-}
-
-/// Tiles that an image of at most `bytes` bytes can keep.
-pub(super) fn tiles_max(map: CubeMap, bytes: usize) -> usize {
-    bytes.saturating_sub(stored_bytes(map, 0)) / TILE_BYTES
 }

@@ -7,6 +7,7 @@
 mod cube_map;
 mod density;
 mod image_bytes;
+mod image_layout;
 mod nearest_depths;
 mod newly_seen;
 mod range_image;

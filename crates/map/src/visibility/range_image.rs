@@ -2,7 +2,7 @@
 
 use super::cube_map::{CubeMap, Pixel, Projection};
 use super::density::PointDensity;
-use super::image_bytes::tiles_max;
+use super::image_layout::tiles_max;
 use super::nearest_depths::{NearestDepths, SPACING_MAX};
 use super::ray_gaps::RayGaps;
 use super::sight::{Sight, sight};
