@@ -316,8 +316,6 @@ fn make_folder(files: &dyn FileSystem, folder: &Path) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
-
     use super::*;
 
     #[test]
