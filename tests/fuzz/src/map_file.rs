@@ -28,7 +28,7 @@ pub(super) fn map_file(bytes: &[u8]) {
         Ok(snapshot) => {
             // The target's own memory is bounded too; a server reserves that of the filters before it builds them.
             let (settings, voxels) = (&snapshot.settings, &snapshot.contents.voxels);
-            if settings.empty_filter_bytes() + settings.filter_bytes_of(voxels) > MEMORY_MAX {
+            if settings.first_filter_bytes() + settings.filter_bytes_of(voxels) > MEMORY_MAX {
                 return;
             }
             if let Ok(map) = snapshot.restore() {

@@ -24,6 +24,11 @@ pub struct CountingBloomFilter {
 }
 
 impl CountingBloomFilter {
+    /// An empty filter of one word that is sized for no key: to be replaced by a larger one before the first comes.
+    pub fn without_room(settings: FilterSettings) -> Self {
+        Self { plane: vec![0; 1], counters: Counters::zero(1), settings, keys: 0, capacity: 0 }
+    }
+
     /// An empty filter sized for `capacity` keys.
     pub fn with_capacity(capacity: usize, settings: FilterSettings) -> Self {
         let words = settings.words(capacity);

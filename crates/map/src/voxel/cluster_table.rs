@@ -37,9 +37,17 @@ pub struct ClusterTable {
 }
 
 impl Default for ClusterTable {
-    /// A table without a block.
+    /// A table without a block. It has a bucket, so that a search has where to begin, and no clusters: they come with the
+    /// first key.
     fn default() -> Self {
-        Self::with_room_for(0)
+        Self {
+            tags: vec![0; 1],
+            keys: vec![VACANT_BUCKET; 1],
+            clusters: Vec::new(),
+            used: 0,
+            blocks: 0,
+            mask_bytes: 0,
+        }
     }
 }
 
@@ -147,7 +155,10 @@ impl ClusterTable {
 
     /// Moves to a larger table. Masks stay where they are, and there are few clusters: this is done while readers wait.
     fn grow(&mut self) {
-        let larger = Self::with_room_for(self.used * 5 / 4 + 4);
+        let larger = Self::with_room_for(match self.clusters.is_empty() {
+            true => 0,
+            false => self.used * 5 / 4 + 4,
+        });
         let Self { keys, clusters, blocks, mask_bytes, .. } = std::mem::replace(self, larger);
         let keys = keys.iter().flat_map(|bucket| bucket.0);
         for (key, cluster) in keys.zip(clusters).filter(|(key, _)| *key != VACANT) {
@@ -278,7 +289,7 @@ mod tests {
                     prop_assert_eq!(table.get(block), &model.get(&block).copied().unwrap_or_default());
                 }
             }
-            let slots = table.keys.len() * (size_of::<Tags>() + BUCKET * (8 + size_of::<Cluster>()));
+            let slots = table.keys.len() * (size_of::<Tags>() + BUCKET * 8) + table.clusters.len() * size_of::<Cluster>();
             prop_assert_eq!(table.bytes(), slots + model.len() * BlockMask::BYTES);
         }
 

@@ -71,7 +71,7 @@ pub(crate) fn from_file(
         return Err(ServiceError::new(Reason::MapFull, message));
     }
     let moments = contents.moments.as_slice().len();
-    reserve(settings.empty_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
+    reserve(settings.first_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
     let map =
         MultiResolutionMap::restore_until(settings, contents, stop)?.ok_or_else(|| ended_early(stop))?;
     drop(part.take());

@@ -40,7 +40,7 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let create = async move {
                 let _empty =
-                    is_new.then(|| inner.budget.reserve(settings.empty_filter_bytes())).transpose()?;
+                    is_new.then(|| inner.budget.reserve(settings.first_filter_bytes())).transpose()?;
                 inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
             };
             let (map, created) = run_to_completion(create).await?;

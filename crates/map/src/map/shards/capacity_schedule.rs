@@ -3,7 +3,7 @@
 /// Capacity grows by this factor. The rest of what a map holds beyond its voxels is empty: half the factor's excess
 /// on average. The smaller it is, the more often keys are put into a larger filter: 1 / (1 - 1 / factor) times.
 pub(super) const FACTOR: f64 = 1.4;
-/// Capacity at first.
+/// Capacity from the first key on.
 pub(super) const FIRST: f64 = 64.0;
 /// Shards grow in so many different places.
 const PHASES: usize = 16;

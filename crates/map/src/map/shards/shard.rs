@@ -34,7 +34,7 @@ impl Shard {
         Self {
             number,
             tiers: std::iter::repeat_with(ClusterTable::default).take(tiers).collect(),
-            levels: (0..settings.levels as usize).map(|n| ShardLevel::empty(number, n, settings)).collect(),
+            levels: (0..settings.levels).map(|_| ShardLevel::empty(settings)).collect(),
         }
     }
 

@@ -1,6 +1,5 @@
 //! What a shard has of one level beside the blocks of its tier.
 
-use super::capacity_schedule::CapacitySchedule;
 use crate::bloom::CountingBloomFilter;
 use crate::map::settings::MapSettings;
 
@@ -14,10 +13,9 @@ pub(in crate::map) struct ShardLevel {
 }
 
 impl ShardLevel {
-    /// A level without a voxel, of the shard with this number.
-    pub(super) fn empty(shard: usize, level: usize, settings: &MapSettings) -> Self {
-        let capacity = CapacitySchedule::of(shard, level).for_items(1);
-        let filter = settings.filter.map(|filter| CountingBloomFilter::with_capacity(capacity, filter));
-        Self { voxels: 0, filter }
+    /// A level without a voxel. Its filter has no room yet: the first key makes it, so that the many shards of a small map
+    /// that hold nothing take nothing.
+    pub(super) fn empty(settings: &MapSettings) -> Self {
+        Self { voxels: 0, filter: settings.filter.map(CountingBloomFilter::without_room) }
     }
 }
