@@ -14,12 +14,12 @@ impl Memory {
 
     /// Bytes that are resident now.
     pub(crate) fn resident(&self) -> usize {
-        self.status("VmRSS:")
+        self.bytes("VmRSS:")
     }
 
     /// The most that were since [`Memory::forget_peak`].
     pub(crate) fn peak(&self) -> usize {
-        self.status("VmHWM:")
+        self.bytes("VmHWM:")
     }
 
     /// The peak is what is resident now.
@@ -27,9 +27,18 @@ impl Memory {
         fs::write(format!("{}/clear_refs", self.folder), "5").unwrap();
     }
 
-    fn status(&self, name: &str) -> usize {
+    /// Threads that there are now.
+    pub(crate) fn threads(&self) -> usize {
+        self.status("Threads:").parse().unwrap()
+    }
+
+    fn bytes(&self, name: &str) -> usize {
+        self.status(name).strip_suffix(" kB").unwrap().parse::<usize>().unwrap() << 10
+    }
+
+    fn status(&self, name: &str) -> String {
         let status = fs::read_to_string(format!("{}/status", self.folder)).unwrap();
         let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap();
-        line.trim().strip_suffix(" kB").unwrap().parse::<usize>().unwrap() << 10
+        line.trim().to_owned()
     }
 }

@@ -94,6 +94,7 @@ impl MapService {
 
     /// Looks how full disk and memory are; to be called every second or so. May block: not for an async thread.
     pub fn measure(&self) -> Readings {
+        self.inner.catalog.relieve_commits();
         self.inner.catalog.all().iter().for_each(|map| map.robots.lost.forget_old());
         self.inner.budget.look()
     }
@@ -233,7 +234,7 @@ impl Drop for Submitted<'_> {
     }
 }
 
-/// The map's thread is gone, by a defect.
+/// Who made the map's changes is gone, by a defect.
 pub(super) fn commit_thread_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
     ServiceError::new(Reason::JobPanicked, "the change failed by a defect of the server")
 }

@@ -153,7 +153,7 @@ impl HostedMap {
     }
 }
 
-/// A change of a keep-out as the map's thread makes it.
+/// A change of a keep-out as a thread for commits makes it.
 pub(super) fn decided(record: KeepOutRecord) -> Decided {
     Decided { change: map::Change::KeepOut(record), record: None, lent: Vec::new(), pin: None }
 }

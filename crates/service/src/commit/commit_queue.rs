@@ -1,17 +1,19 @@
-//! The way into a map: a queue of changes, and the thread that takes them out of it.
+//! The way into a map: a queue of changes, which a thread that is free takes out of it.
 
-use std::sync::{Arc, OnceLock};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, OnceLock, Weak};
 
 use tokio::sync::{oneshot, watch};
 
+use super::commit_threads::{CommitThreads, Turn};
 use super::stop::Stop;
 use super::submission::{Outcome, Submission, Waiting};
+use super::turns::Turns;
 use super::worker::{GROUP_MAX, Published, Worker};
-use crate::error::{Reason, ServiceError};
-use crate::work::{Asker, Requester, Shares};
+use crate::error::ServiceError;
+use crate::work::{Asker, Requester, Share, Shares};
 use mrol_map::map::{MapName, MultiResolutionMap};
-use mrol_map::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use mrol_map::sync::thread;
+use mrol_map::sync::{Mutex, Rank};
 use mrol_map::util::{Durations, SharedDurations};
 use mrol_store::{MapFolder, StoreSettings};
 
@@ -19,58 +21,74 @@ use mrol_store::{MapFolder, StoreSettings};
 /// nobody else waits.
 const PLACES: usize = 2 * GROUP_MAX;
 
-/// The way into a map. Dropping it ends the map's thread, after the changes that wait.
+/// The way into a map. Dropped, it takes nothing any more; the changes that wait are made.
 #[derive(Debug)]
 pub(crate) struct CommitQueue {
-    inbox: SyncSender<Waiting>,
+    threads: Arc<CommitThreads>,
+    inbox: Arc<Inbox>,
     /// The places of changes that wait, of which nobody has all.
     places: Arc<Shares>,
     stopped: Arc<OnceLock<Stop>>,
-    /// True once no other revision will come: those who wait for one hold the map, and so its thread.
+    /// True once no other revision will come: those who wait for one hold the map, and so its queue.
     ended: watch::Sender<bool>,
     durations: Arc<SharedDurations>,
 }
 
-/// The thread of a map that is not there yet. It is started before anything is done on the disk, so that what was done
-/// there never lacks a thread; dropped, it ends.
-pub(crate) struct CommitThread(SyncSender<(Worker, Receiver<Waiting>)>);
+/// The changes that wait, and who makes them. One thread at a time has a turn.
+struct Inbox {
+    state: Mutex<State>,
+    threads: Weak<CommitThreads>,
+    this: Weak<Self>,
+}
 
-impl CommitThread {
-    /// Starts the thread of a map of that name.
-    ///
-    /// # Errors
-    /// When the system has no thread left.
-    pub(crate) fn start(name: &MapName) -> Result<Self, ServiceError> {
-        let (begin, begun) = sync_channel::<(Worker, Receiver<Waiting>)>(1);
-        let thread = thread::Builder::new().name(format!("mrol-commit-{name}"));
-        let started = thread.spawn(move || {
-            if let Ok((worker, waiting)) = begun.recv() {
-                worker.run(&waiting);
-            }
-        });
-        let no_threads = |e: std::io::Error| ServiceError::new(Reason::NoThreads, e.to_string());
-        started.map_err(no_threads).map(|_| Self(begin))
+struct State {
+    waiting: Turns,
+    /// None while a thread works with it, once a defect ended it, and when all is done.
+    worker: Option<Worker>,
+    /// A turn is due, or under way.
+    is_due: bool,
+    /// A turn is asked for later, to sync.
+    is_alarm_set: bool,
+    is_closed: bool,
+    /// A defect ended the worker: who comes now is told so.
+    is_broken: bool,
+}
+
+impl std::fmt::Debug for Inbox {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Inbox")
     }
 }
 
 impl CommitQueue {
-    /// Gives `thread` a map.
+    /// The way into `map`, whose changes `threads` make.
     pub(crate) fn begin(
-        thread: CommitThread,
+        threads: &Arc<CommitThreads>,
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
         published: Published,
         settings: &StoreSettings,
     ) -> Self {
-        let (inbox, waiting) = sync_channel(PLACES);
         let stopped = Arc::new(OnceLock::new());
         let durations = Arc::<SharedDurations>::default();
         let worker =
             Worker::new(name, map, folder, published, Arc::clone(&stopped), Arc::clone(&durations), settings);
-        // It waits for just this.
-        drop(thread.0.send((worker, waiting)));
+        let state = State {
+            waiting: Turns::default(),
+            worker: Some(worker),
+            is_due: false,
+            is_alarm_set: false,
+            is_closed: false,
+            is_broken: false,
+        };
+        let inbox = Arc::new_cyclic(|this| Inbox {
+            state: Mutex::new(Rank::Brief, state),
+            threads: Arc::downgrade(threads),
+            this: Weak::clone(this),
+        });
         Self {
+            threads: Arc::clone(threads),
             inbox,
             places: Arc::new(Shares::new(PLACES)),
             stopped,
@@ -80,8 +98,8 @@ impl CommitQueue {
     }
 
     /// Hands a change over; its outcome comes when it is visible, and with [`Durability::Always`] durable. Does not
-    /// wait: the thread of a map whose disk hangs takes nothing from its queue, and who waited for a place in it would
-    /// keep a thread from the other maps.
+    /// wait: from the queue of a map whose disk hangs nothing is taken, and who waited for a place in it would keep a
+    /// thread from the other maps.
     ///
     /// # Errors
     /// `ResourceExhausted` where as many changes of the same asker wait as there are places left.
@@ -90,14 +108,31 @@ impl CommitQueue {
         requester: &Requester,
         submission: Submission,
     ) -> Result<oneshot::Receiver<Outcome>, ServiceError> {
-        let (answer, outcome) = oneshot::channel();
         let place = self.places.take(&requester.asker).ok_or_else(|| full(&requester.asker))?;
+        Ok(self.put(requester, submission, Some(place)))
+    }
+
+    /// Hands a change over, in a place of its own or in none.
+    fn put(
+        &self,
+        requester: &Requester,
+        submission: Submission,
+        place: Option<Share>,
+    ) -> oneshot::Receiver<Outcome> {
+        let (answer, outcome) = oneshot::channel();
         let requester = requester.clone();
-        match self.inbox.try_send(Waiting { submission, answer, requester, _place: Some(place) }) {
-            // Where the thread is gone, so is the sender of the outcome.
-            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(outcome),
-            Err(TrySendError::Full(waiting)) => Err(full(&waiting.requester.asker)),
+        let mut state = self.inbox.state.lock();
+        // Where the worker is gone, so is the sender of the outcome.
+        if !state.is_broken {
+            state.waiting.push(Waiting { submission, answer, requester, _place: place });
+            let was_due = std::mem::replace(&mut state.is_due, true);
+            drop(state);
+            match was_due {
+                false => self.threads.schedule(Arc::clone(&self.inbox) as Arc<dyn Turn>),
+                true => self.threads.relieve(),
+            }
         }
+        outcome
     }
 
     /// How long groups of changes took to become durable and visible.
@@ -125,15 +160,113 @@ impl CommitQueue {
     /// Another map takes its place: it takes no more changes here, and when this returns, none is on its way.
     pub(crate) fn end_replaced(&self) {
         self.stopped.get_or_init(|| Stop::Replaced);
-        let (answer, behind_all) = oneshot::channel();
-        let submission = Submission::Undecided(Box::new(|_, _| Ok(None)));
-        // What is still to have its turn is refused from now on. Waits for a place in the queue; where the thread is gone,
-        // so are its changes.
+        let nothing = Submission::Undecided(Box::new(|_, _| Ok(None)));
+        // What is still to have its turn is refused from now on. It takes no place; where the worker is gone, so are its changes.
         let requester = Requester::from(&Asker::default());
-        if self.inbox.send(Waiting { submission, answer, requester, _place: None }).is_ok() {
-            drop(behind_all.blocking_recv());
-        }
+        drop(self.put(&requester, nothing, None).blocking_recv());
         self.ended.send_replace(true);
+    }
+}
+
+impl Drop for CommitQueue {
+    fn drop(&mut self) {
+        let mut state = self.inbox.state.lock();
+        state.is_closed = true;
+        let was_due = std::mem::replace(&mut state.is_due, true);
+        drop(state);
+        // What was made is synced, and the map given back, on a thread that may wait for a disk.
+        if !was_due {
+            self.threads.schedule(Arc::clone(&self.inbox) as Arc<dyn Turn>);
+        }
+    }
+}
+
+impl Turn for Inbox {
+    fn take(&self) -> bool {
+        let mut state = self.state.lock();
+        let Some(worker) = state.worker.take() else {
+            state.is_due = false;
+            return false;
+        };
+        let waiting = state.waiting.group(GROUP_MAX);
+        drop(state);
+        let commit = move || {
+            let mut worker = worker;
+            worker.commit(waiting);
+            worker.sync_if_due();
+            worker
+        };
+        // A defect ends the map's changes, as those who wait for them hear, and no thread.
+        match catch_unwind(AssertUnwindSafe(commit)) {
+            Ok(worker) => self.put_back(worker),
+            Err(_) => self.give_up(),
+        }
+    }
+
+    fn wake(self: Arc<Self>, threads: &CommitThreads) {
+        let mut state = self.state.lock();
+        state.is_alarm_set = false;
+        let was_due = std::mem::replace(&mut state.is_due, true);
+        drop(state);
+        if !was_due {
+            threads.schedule(self);
+        }
+    }
+}
+
+impl Inbox {
+    /// Ends a turn; true where another is due.
+    fn put_back(&self, mut worker: Worker) -> bool {
+        let mut state = self.state.lock();
+        if !state.waiting.is_empty() {
+            state.worker = Some(worker);
+            return true;
+        }
+        if state.is_closed {
+            drop(state);
+            worker.sync();
+            return false;
+        }
+        let alarm = worker.due_at().filter(|_| !state.is_alarm_set);
+        state.is_alarm_set |= alarm.is_some();
+        state.worker = Some(worker);
+        state.is_due = false;
+        drop(state);
+        if let (Some(at), Some(threads)) = (alarm, self.threads.upgrade()) {
+            let this: Weak<dyn Turn> = self.this.clone();
+            if threads.wake_at(at, this).is_err() {
+                self.sync_now();
+            }
+        }
+        false
+    }
+
+    /// Syncs at once what nobody would wake this for later.
+    fn sync_now(&self) {
+        let mut state = self.state.lock();
+        state.is_alarm_set = false;
+        if state.is_due {
+            return;
+        }
+        let Some(mut worker) = state.worker.take() else { return };
+        state.is_due = true;
+        drop(state);
+        worker.sync();
+        if self.put_back(worker)
+            && let (Some(this), Some(threads)) = (self.this.upgrade(), self.threads.upgrade())
+        {
+            threads.schedule(this);
+        }
+    }
+
+    /// Lets go of the changes that wait, whose callers hear of it.
+    fn give_up(&self) -> bool {
+        let mut state = self.state.lock();
+        (state.is_broken, state.is_due) = (true, false);
+        let gone = std::mem::take(&mut state.waiting);
+        drop(state);
+        drop(gone);
+        false
     }
 }
 

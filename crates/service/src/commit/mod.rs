@@ -1,7 +1,7 @@
 //! How changes become durable, then visible, then acknowledged.
 //!
 //! ```text
-//! many threads                one thread a map
+//! many threads                one thread at a time
 //!
 //! align, quantize, encode --> take those that wait, in turns of callers, then of robots
 //!                             append to the journal   they take their revisions here
@@ -13,11 +13,13 @@
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
 //! before it is applied and nothing after it has begun.
 //!
-//! A [`Submission`] goes into the [`CommitQueue`] of its map, where `turns` orders it; the `worker` takes it out, journals it, applies it and
+//! A [`Submission`] goes into the [`CommitQueue`] of its map, where `turns` orders it; one of the [`CommitThreads`], which all
+//! maps share, takes it out, and the map's `worker` journals it, applies it and
 //! publishes it to [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn
 //! comes.
 
 mod commit_queue;
+mod commit_threads;
 mod recent_changes;
 mod scan_turn;
 mod stop;
@@ -26,7 +28,8 @@ mod turns;
 mod watched_change;
 mod worker;
 
-pub(crate) use commit_queue::{CommitQueue, CommitThread};
+pub(crate) use commit_queue::CommitQueue;
+pub(crate) use commit_threads::CommitThreads;
 pub(crate) use recent_changes::{RecentChanges, WatchedLevel};
 pub(crate) use scan_turn::TurnLimits;
 pub(crate) use stop::Stop;

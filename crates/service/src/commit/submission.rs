@@ -1,4 +1,4 @@
-//! A change on its way into a map: what is handed to the map's thread, and what becomes of it.
+//! A change on its way into a map: what is handed to the map's queue, and what becomes of it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The thread of a map: durable, then visible, then acknowledged.
+//! Who makes the changes of a map: durable, then visible, then acknowledged.
 
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -11,12 +11,10 @@ use super::stop::{Stop, outcome_unknown, revisions_used_up};
 use super::submission::{
     Decided, Decision, Outcome, Prepared, Refusal, RobotLock, Submission, Waiting, record_of,
 };
-use super::turns::Turns;
 use super::watched_change::WatchedChange;
 use crate::error::ServiceError;
 use crate::resources::Reservation;
 use mrol_map::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
-use mrol_map::sync::mpsc::{Receiver, RecvTimeoutError};
 use mrol_map::util::{SharedDurations, StopSignal};
 use mrol_store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 
@@ -25,7 +23,7 @@ pub(super) const GROUP_MAX: usize = 256;
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
 
-/// Where a map's thread publishes each change that it made.
+/// Where the worker of a map publishes each change that it made.
 pub(crate) struct Published {
     /// The last revision, for those who wait for one.
     pub(crate) announced: watch::Sender<u64>,
@@ -33,7 +31,7 @@ pub(crate) struct Published {
     pub(crate) recent: Arc<RecentChanges>,
 }
 
-/// What a map's thread works with.
+/// What the changes of a map are made with, by one thread at a time.
 pub(super) struct Worker {
     name: MapName,
     map: Arc<MultiResolutionMap>,
@@ -74,33 +72,8 @@ impl Worker {
         Self { name, map, folder, published, stopped, durations, settings, unsynced: None, thinned }
     }
 
-    /// Makes changes until nobody can send one any more.
-    pub(super) fn run(mut self, inbox: &Receiver<Waiting>) {
-        let mut turns = Turns::default();
-        loop {
-            if turns.is_empty() {
-                match self.next(inbox) {
-                    Ok(first) => turns.push(first),
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => break,
-                }
-            }
-            inbox.try_iter().for_each(|waiting| turns.push(waiting));
-            self.commit(turns.group(GROUP_MAX));
-            self.sync_if_due();
-        }
-        self.sync();
-    }
-
-    fn next(&self, inbox: &Receiver<Waiting>) -> Result<Waiting, RecvTimeoutError> {
-        match self.until_sync() {
-            Some(rest) => inbox.recv_timeout(rest),
-            None => inbox.recv().map_err(|_| RecvTimeoutError::Disconnected),
-        }
-    }
-
     /// Makes the changes that wait, in order; a run of known ones shares one sync.
-    fn commit(&mut self, waiting: Vec<Waiting>) {
+    pub(super) fn commit(&mut self, waiting: Vec<Waiting>) {
         let mut group = Vec::new();
         for Waiting { submission, answer, .. } in waiting {
             match submission {
@@ -267,13 +240,18 @@ impl Worker {
         Some(interval.saturating_sub(self.unsynced?.elapsed()))
     }
 
-    fn sync_if_due(&mut self) {
+    /// When what was written is to be synced; none where nothing is.
+    pub(super) fn due_at(&self) -> Option<Instant> {
+        Some(Instant::now() + self.until_sync()?)
+    }
+
+    pub(super) fn sync_if_due(&mut self) {
         if self.until_sync().is_some_and(|rest| rest.is_zero()) {
             self.sync();
         }
     }
 
-    fn sync(&mut self) {
+    pub(super) fn sync(&mut self) {
         self.unsynced = None;
         if let (Some(folder), None) = (&self.folder, self.stopped.get())
             && let Err(error) = folder.sync()
@@ -287,7 +265,7 @@ impl Worker {
 impl Drop for Worker {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            self.stopped.get_or_init(|| Stop::Failed("a defect of the server ended its thread".into()));
+            self.stopped.get_or_init(|| Stop::Failed("a defect of the server ended its changes".into()));
         }
     }
 }

@@ -186,8 +186,9 @@ impl MapService {
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        let made_room =
-            self.inner.catalog.save(move |map| map.make_room(&inner.budget).map(|()| false)).await;
+        let is_scarce = inner.budget.is_disk_scarce();
+        let make_room = move |map: &HostedMap| map.make_room(&inner.budget).map(|()| false);
+        let made_room = self.inner.catalog.save(|_| is_scarce, make_room).await;
         // The others are saved all the same: their journals grow just where there is no room.
         let saved = self.save_maps(Saving::Due).await;
         made_room.and(saved)
@@ -195,7 +196,8 @@ impl MapService {
 
     async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        self.inner.catalog.save(move |map| map.save(which, &inner.budget)).await
+        let needs = move |map: &HostedMap| map.needs_saving(which);
+        self.inner.catalog.save(needs, move |map| map.save(which, &inner.budget)).await
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

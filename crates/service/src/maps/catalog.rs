@@ -11,7 +11,7 @@ use super::hosted_map::HostedMap;
 use super::named::Named;
 use super::opening::{not_stored, open_all};
 use crate::caller::{AllowedMaps, Reachable};
-use crate::commit::CommitThread;
+use crate::commit::CommitThreads;
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::request::{MapVersion, UnavailableMap};
 use mrol_map::bloom::FilterSettings;
@@ -28,6 +28,7 @@ pub(crate) struct Catalog {
     maps: RwLock<Named>,
     data_dir: Option<Arc<DataDir>>,
     settings: StoreSettings,
+    commit_threads: Arc<CommitThreads>,
     writing: tokio::sync::Mutex<()>,
 }
 
@@ -40,9 +41,11 @@ impl Catalog {
     ) -> Result<Self, ServiceError> {
         let open = |path: &Path| DataDir::open(path, settings.clone());
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
-        let maps = data_dir.as_ref().map(|data_dir| open_all(data_dir, settings, progress)).transpose()?;
+        let commit_threads = CommitThreads::start()?;
+        let open = |data_dir: &DataDir| open_all(data_dir, &commit_threads, settings, progress);
+        let maps = data_dir.as_ref().map(open).transpose()?;
         let (maps, data_dir) = (RwLock::new(Rank::Brief, maps.unwrap_or_default()), data_dir.map(Arc::new));
-        Ok(Self { maps, data_dir, settings: settings.clone(), writing: Default::default() })
+        Ok(Self { maps, data_dir, settings: settings.clone(), commit_threads, writing: Default::default() })
     }
 
     pub(crate) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
@@ -79,6 +82,11 @@ impl Catalog {
         reachable
             .map(|(name, reason)| UnavailableMap { name: name.clone(), reason: reason.clone() })
             .collect()
+    }
+
+    /// Sees that no disk that hangs keeps the changes of other maps waiting; to be called every second or so.
+    pub(crate) fn relieve_commits(&self) {
+        self.commit_threads.relieve();
     }
 
     pub(crate) fn all(&self) -> Vec<Arc<HostedMap>> {
@@ -177,11 +185,12 @@ impl Catalog {
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let (data_dir, of, settings) = (self.data_dir.clone(), name.clone(), self.settings.clone());
+        let threads = Arc::clone(&self.commit_threads);
         let map = blocking(move || {
-            let (map, thread) = (build()?, CommitThread::start(&of)?);
+            let map = build()?;
             let create = |data_dir: Arc<DataDir>| data_dir.create(&of, &Snapshot::of(&map, uuid));
             let folder = data_dir.map(create).transpose().map_err(not_stored)?;
-            Ok(Arc::new(HostedMap::new(thread, of, uuid, map, folder, &settings)))
+            Ok(Arc::new(HostedMap::new(&threads, of, uuid, map, folder, &settings)))
         })
         .await?;
         self.maps.write().open.insert(name.clone(), Arc::clone(&map));
@@ -196,13 +205,13 @@ impl Catalog {
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
+        let threads = Arc::clone(&self.commit_threads);
         let taken: Vec<MapName> = {
             let maps = self.maps.read();
             maps.open.keys().chain(maps.unavailable.keys()).cloned().collect()
         };
         let exchanged = blocking(move || {
             let map = build()?;
-            let [thread, thread_of_old] = [CommitThread::start(&old.name)?, CommitThread::start(&old.name)?];
             // Its revision, and so its new name, is known from now on.
             old.commit_queue.end_replaced();
             let synced = old.folder.as_ref().map_or(Ok(()), |folder| folder.sync()).map_err(not_stored);
@@ -220,12 +229,12 @@ impl Catalog {
             };
             match exchange() {
                 Ok((kept, folder)) => {
-                    let kept = old.again_as(thread_of_old, kept, &settings);
-                    let new = HostedMap::new(thread, old.name.clone(), uuid, map, folder, &settings);
+                    let kept = old.again_as(&threads, kept, &settings);
+                    let new = HostedMap::new(&threads, old.name.clone(), uuid, map, folder, &settings);
                     Ok((Arc::new(new), Arc::new(kept), None))
                 }
                 Err(error) => {
-                    let old = Arc::new(old.again_as(thread_of_old, old.name.clone(), &settings));
+                    let old = Arc::new(old.again_as(&threads, old.name.clone(), &settings));
                     Ok((Arc::clone(&old), old, Some(error)))
                 }
             }
@@ -269,14 +278,16 @@ impl Catalog {
         })
     }
 
-    /// Writes a snapshot of each map by `save`, which says whether it did; the number of those that it wrote. One that
-    /// cannot be written keeps none of the others from it.
+    /// Writes a snapshot of each map that `needs` one by `save`, which says whether it did; the number of those that it
+    /// wrote. One that cannot be written keeps none of the others from it. Of thousands of maps few need one, and no thread
+    /// is asked to look at the others.
     pub(crate) async fn save(
         &self,
+        needs: impl Fn(&HostedMap) -> bool,
         save: impl Fn(&HostedMap) -> Result<bool, StoreError> + Clone + Send + 'static,
     ) -> Result<usize, ServiceError> {
         let (mut saved, mut failed) = (0, None);
-        for map in self.all() {
+        for map in self.all().into_iter().filter(|map| needs(map)) {
             let save = save.clone();
             match self.on_disk(move |_| save(&map)).await {
                 Ok(written) => saved += usize::from(written.unwrap_or(false)),

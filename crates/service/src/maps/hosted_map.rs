@@ -9,7 +9,7 @@ use super::followers::Followers;
 use super::keep_out_expiry::KeepOutExpiry;
 use super::robots::Robots;
 use super::snapshots::Snapshots;
-use crate::commit::{CommitQueue, CommitThread, Stop};
+use crate::commit::{CommitQueue, CommitThreads, Stop};
 use crate::error::{Reason, ServiceError};
 use crate::request::{MapInfo, MapStorage, MapVersion};
 use crate::work::ended_early;
@@ -41,9 +41,9 @@ pub(crate) struct HostedMap {
 const RATE_SEED: u64 = 1;
 
 impl HostedMap {
-    /// Takes a map into service; `thread` makes its changes.
+    /// Takes a map into service; `threads` make its changes.
     pub(crate) fn new(
-        thread: CommitThread,
+        threads: &Arc<CommitThreads>,
         name: MapName,
         uuid: Uuid,
         map: impl Into<Arc<MultiResolutionMap>>,
@@ -52,29 +52,34 @@ impl HostedMap {
     ) -> Self {
         let map = map.into();
         let history = ContentHistory::of(map.content_version());
-        Self::of_shared(thread, name, uuid, map, history, folder.map(Arc::new), settings)
+        Self::of_shared(threads, name, uuid, map, history, folder.map(Arc::new), settings)
     }
 
-    /// Takes a map into service that was opened; `thread` makes its changes.
+    /// Takes a map into service that was opened; `threads` make its changes.
     pub(super) fn opened(
-        thread: CommitThread,
+        threads: &Arc<CommitThreads>,
         name: MapName,
         opened: OpenedMap,
         settings: &StoreSettings,
     ) -> Self {
         let OpenedMap { uuid, map, history, folder, .. } = opened;
-        Self::of_shared(thread, name, uuid, Arc::new(map), history, Some(Arc::new(folder)), settings)
+        Self::of_shared(threads, name, uuid, Arc::new(map), history, Some(Arc::new(folder)), settings)
     }
 
     /// This map under the name `name`, once it has ended under its own.
-    pub(super) fn again_as(&self, thread: CommitThread, name: MapName, settings: &StoreSettings) -> Self {
+    pub(super) fn again_as(
+        &self,
+        threads: &Arc<CommitThreads>,
+        name: MapName,
+        settings: &StoreSettings,
+    ) -> Self {
         let (map, folder) = (Arc::clone(&self.map), self.folder.clone());
         let history = self.followers.recent.history();
-        Self::of_shared(thread, name, self.uuid, map, history, folder, settings)
+        Self::of_shared(threads, name, self.uuid, map, history, folder, settings)
     }
 
     fn of_shared(
-        thread: CommitThread,
+        threads: &Arc<CommitThreads>,
         name: MapName,
         uuid: Uuid,
         map: Arc<MultiResolutionMap>,
@@ -84,7 +89,7 @@ impl HostedMap {
     ) -> Self {
         let (followers, published) = Followers::new(map.revision(), history, settings.watch_bytes_max);
         let commit_queue =
-            CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), published, settings);
+            CommitQueue::begin(threads, name.clone(), Arc::clone(&map), folder.clone(), published, settings);
         Self {
             name,
             uuid,

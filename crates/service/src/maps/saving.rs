@@ -17,16 +17,21 @@ pub(crate) enum Saving {
 }
 
 impl HostedMap {
+    /// True where a snapshot is to be written, if there is room for it. Does not wait for a disk.
+    pub(crate) fn needs_saving(&self, which: Saving) -> bool {
+        let Some(folder) = self.folder.as_ref().filter(|_| self.commit_queue.stopped().is_none()) else {
+            return false;
+        };
+        self.map.revision() != folder.used().snapshot
+            && (which == Saving::Changed || folder.snapshot_is_due())
+    }
+
     /// Writes a snapshot where there is need and room for one; true when it did. A map whose journal failed is left as
     /// it is.
     pub(crate) fn save(&self, which: Saving, budget: &ResourceBudget) -> Result<bool, StoreError> {
-        let Some(folder) = self.folder.as_ref().filter(|_| self.commit_queue.stopped().is_none()) else {
+        let Some(folder) = self.folder.as_ref().filter(|_| self.needs_saving(which)) else {
             return Ok(false);
         };
-        let changed = self.map.revision() != folder.used().snapshot;
-        if !changed || which == Saving::Due && !folder.snapshot_is_due() {
-            return Ok(false);
-        }
         let lent = budget
             .check_to_shrink()
             .and_then(|()| budget.reserve_transient(snapshot_bytes(&self.map), "a snapshot"));

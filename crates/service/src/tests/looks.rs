@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use uuid::Uuid;
 
-use crate::commit::{CommitThread, Step};
+use crate::commit::{CommitThreads, Step};
 use crate::error::{Reason, ServiceError};
 use crate::lifecycle::from_file;
 use crate::limits::{Limits, Marks};
@@ -43,8 +43,8 @@ fn hosted() -> HostedMap {
     map.committer().insert_scan(ScanRecord::of_points(pose, &wall(10_000), map.lattice()));
     {
         let name = MapName::new("a").unwrap();
-        let thread = CommitThread::start(&name).unwrap();
-        HostedMap::new(thread, name, Uuid::nil(), map, None, &StoreSettings::default())
+        let threads = CommitThreads::start().unwrap();
+        HostedMap::new(&threads, name, Uuid::nil(), map, None, &StoreSettings::default())
     }
 }
 
@@ -55,8 +55,8 @@ fn sheet(side: i32) -> (HostedMap, u64) {
     let map = MultiResolutionMap::restore(MapSettings::new(0.05, 4), contents).unwrap();
     let bytes = map.memory_bytes() as u64;
     let name = MapName::new("sheet").unwrap();
-    let thread = CommitThread::start(&name).unwrap();
-    (HostedMap::new(thread, name, Uuid::nil(), map, None, &StoreSettings::default()), bytes)
+    let threads = CommitThreads::start().unwrap();
+    (HostedMap::new(&threads, name, Uuid::nil(), map, None, &StoreSettings::default()), bytes)
 }
 
 #[test]

@@ -12,7 +12,7 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler};
 use shuttle::{Config, Runner, thread};
 use uuid::Uuid;
 
-use crate::commit::{CommitThread, Step};
+use crate::commit::{CommitThreads, Step};
 use crate::error::ServiceError;
 use crate::limits::Marks;
 use crate::maps::{HostedMap, Saving};
@@ -89,8 +89,8 @@ fn crowd() {
     let disk = simulated::SimulatedDisk::default();
     let (uuid, core) = (Uuid::from_u128(7), MultiResolutionMap::new(MapSettings::new(1.0, 4)).unwrap());
     let folder = data_dir(&disk).create(&name(), &Snapshot::of(&core, uuid)).unwrap();
-    let thread = CommitThread::start(&name()).unwrap();
-    let map = HostedMap::new(thread, name(), uuid, core, Some(folder), &StoreSettings::default());
+    let threads = CommitThreads::start().unwrap();
+    let map = HostedMap::new(&threads, name(), uuid, core, Some(folder), &StoreSettings::default());
     let (map, budget) = (Arc::new(map), Arc::new(ResourceBudget::new(None, Marks::default())));
     let spawn = |work: fn(&Arc<HostedMap>, &Arc<ResourceBudget>) -> u64| {
         let (map, budget) = (Arc::clone(&map), Arc::clone(&budget));

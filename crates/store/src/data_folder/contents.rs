@@ -1,6 +1,6 @@
 //! Contents of a data folder at a start, after repair of what a crash left.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::data_dir::DataDir;
@@ -81,11 +81,12 @@ impl DataDir {
         Ok(self.entries()?.into_iter().filter(has_it).map(|entry| self.maps.join(entry)).collect())
     }
 
-    /// Adds the bytes that opening the maps `names` will read to `progress`. Problems with a map are reported when it
+    /// Adds the bytes that opening the maps of `folders` will read to `progress`. Problems with a map are reported when it
     /// is opened.
-    pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) {
-        for name in names {
-            let bytes = self.path(name).and_then(|path| map_files::bytes_to_read(&*self.files, &path));
+    pub fn expect(&self, folders: &BTreeMap<MapName, Vec<String>>, progress: &OpeningProgress) {
+        for (name, folders) in folders {
+            let path = self.path_of(name, folders);
+            let bytes = path.and_then(|path| map_files::bytes_to_read(&*self.files, &path));
             progress.expect_map(bytes.unwrap_or_default());
         }
     }

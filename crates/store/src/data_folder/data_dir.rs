@@ -1,6 +1,6 @@
 //! The data folder in use: its maps are opened, created, replaced and removed.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -94,7 +94,20 @@ impl DataDir {
     /// When its files cannot be read, something is missing that may have been acknowledged, or two folders claim to be
     /// the map.
     pub fn map(&self, name: &MapName, progress: &OpeningProgress) -> Result<OpenedMap, StoreError> {
-        let (path, uuid) = self.adopted(name, progress)?;
+        self.map_of(name, &self.folders_of(name)?, progress)
+    }
+
+    /// [`DataDir::map`], where the folders that claim to be the map were listed before.
+    ///
+    /// # Errors
+    /// As for [`DataDir::map`].
+    pub fn map_of(
+        &self,
+        name: &MapName,
+        folders: &[String],
+        progress: &OpeningProgress,
+    ) -> Result<OpenedMap, StoreError> {
+        let (path, uuid) = self.adopted(self.path_of(name, folders)?, name, progress)?;
         let files = Arc::clone(&self.files);
         let opened = MapFolder::open(files, path, uuid, self.settings.clone(), progress)?;
         progress.map_is_open();
@@ -259,10 +272,26 @@ impl DataDir {
     /// before the next map is created.
     pub(crate) fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
         let mut entries = self.entries()?;
+        // Of thousands of entries few are read further.
+        entries.retain(|entry| entry.starts_with(name.as_str()));
         let leftovers = self.leftovers.lock();
         entries
             .retain(|entry| Entry::of(entry).into_map().as_ref() == Some(name) && !leftovers.contains(entry));
         Ok(entries)
+    }
+
+    /// The folders that claim to be maps, by name: one listing for all maps.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn folders(&self) -> Result<BTreeMap<MapName, Vec<String>>, StoreError> {
+        let mut folders = BTreeMap::<MapName, Vec<String>>::new();
+        for entry in self.entries()? {
+            if let Some(name) = Entry::of(&entry).into_map() {
+                folders.entry(name).or_default().push(entry);
+            }
+        }
+        Ok(folders)
     }
 
     /// The folder of a map.
@@ -270,7 +299,12 @@ impl DataDir {
     /// # Errors
     /// Where there is none, or more than one.
     pub(crate) fn path(&self, name: &MapName) -> Result<PathBuf, StoreError> {
-        match &self.folders_of(name)?[..] {
+        self.path_of(name, &self.folders_of(name)?)
+    }
+
+    /// The folder of a map of which `folders` claim to be it.
+    pub(crate) fn path_of(&self, name: &MapName, folders: &[String]) -> Result<PathBuf, StoreError> {
+        match folders {
             [] => Err(StoreError::NoFolder(name.clone())),
             [one] => Ok(self.maps.join(one)),
             [first, second, ..] => {
@@ -281,8 +315,12 @@ impl DataDir {
     }
 
     /// Path of a map's folder with the uuid in its name; a folder of a former release is renamed first.
-    fn adopted(&self, name: &MapName, progress: &OpeningProgress) -> Result<(PathBuf, Uuid), StoreError> {
-        let path = self.path(name)?;
+    fn adopted(
+        &self,
+        path: PathBuf,
+        name: &MapName,
+        progress: &OpeningProgress,
+    ) -> Result<(PathBuf, Uuid), StoreError> {
         if let Entry::Map { uuid, .. } = Entry::of_path(&path) {
             return Ok((path, uuid));
         }
