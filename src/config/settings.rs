@@ -5,6 +5,7 @@ use super::error::ConfigError;
 use super::filter::FilterConfig;
 use super::listener::ListenerConfig;
 use super::log::LogConfig;
+use super::maps::MapsConfig;
 use super::scans::AlignmentConfig;
 use super::scans::RobotConfig;
 use super::store::StoreConfig;
@@ -34,6 +35,8 @@ pub struct Config {
     pub data_dir: PathBuf,
     /// Settings of the store.
     pub store: StoreConfig,
+    /// Which maps are kept in memory.
+    pub maps: MapsConfig,
     /// Seconds that requests in flight may take when the server goes down, and saving the maps after them. 10.
     pub drain_seconds: u64,
     /// Seconds that the server goes on to serve after it was told to end, while `/readyz` says that it is not ready: for
@@ -67,6 +70,7 @@ impl Default for Config {
         Self {
             data_dir: "./mrol-data".into(),
             store: StoreConfig::default(),
+            maps: MapsConfig::default(),
             drain_seconds: 10,
             drain_delay_s: 0,
             http: listener(7333),
@@ -94,6 +98,9 @@ impl Config {
             if !(1..=1 << 20).contains(&value) {
                 return range(key, "1 to 1048576", value.to_string());
             }
+        }
+        if self.maps.sleep_after_s > 1 << 20 {
+            return range("maps.sleep_after_s", "0 to 1048576", self.maps.sleep_after_s.to_string());
         }
         for (key, threads) in [
             ("threads.query", self.threads.query),
@@ -148,6 +155,7 @@ impl Config {
             stationary: StationarySettings::default(),
             robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.settings())).collect(),
             filter: FilterSettings { hashes, bits_per_key },
+            sleep_after: self.maps.sleep_after(),
         }
     }
 

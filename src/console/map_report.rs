@@ -20,13 +20,14 @@ impl MapReport {
     pub fn line(info: &MapInfo) -> String {
         let voxels = info.levels.first().map_or(0, |level| level.voxels);
         format!(
-            "{:<24} {:>9} m {:>3} levels {:>14} voxels {:>8} scans   revision {}",
+            "{:<24} {:>9} m {:>3} levels {:>14} voxels {:>8} scans   revision {}{}",
             info.name.as_str(),
             info.settings.resolution_m,
             info.settings.levels,
             count(voxels),
             count(info.scans),
             info.version.revision,
+            if info.is_asleep { "   asleep" } else { "" },
         )
     }
 }

@@ -133,5 +133,11 @@ async fn scrape(metrics: &Metrics, service: &MapService) -> String {
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    metrics.render(&service.lanes(), &service.map_names(), &maps, &service.unavailable_maps())
+    metrics.render(
+        &service.lanes(),
+        &service.map_names(),
+        &maps,
+        service.maps_awake(),
+        &service.unavailable_maps(),
+    )
 }

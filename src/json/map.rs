@@ -37,6 +37,8 @@ pub struct JsonMap {
     /// The last scan of each robot since the server was started; of one map alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sightings: Vec<JsonSighting>,
+    /// True of a map that is not in memory: what is told of it is from when it left, and the next request opens it.
+    pub asleep: bool,
     /// Bytes of the exact sets.
     pub set_bytes: usize,
     /// Bytes of the moments of points.
@@ -193,6 +195,7 @@ impl From<MapInfo> for JsonMap {
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             sightings: info.sightings.iter().map(Into::into).collect(),
+            asleep: info.is_asleep,
             set_bytes: info.set_bytes,
             moment_bytes: info.moment_bytes,
             trajectory_bytes: info.trajectory_bytes,

@@ -8,7 +8,7 @@ use super::map_counters;
 use super::map_counters::Series;
 use mrol_map::map::{FilterInfo, LevelInfo, MapName};
 use mrol_map::util::Durations;
-use mrol_service::{LaneUse, MapInfo, MapStorage, UnavailableMap};
+use mrol_service::{LaneUse, MapInfo, MapStorage, MapsAwake, UnavailableMap};
 
 /// Appends what was counted by map.
 pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Series, u64>)]) {
@@ -104,6 +104,17 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
         family.sample(&[("map", &map.name)], map.scans);
     }
     write_storage(text, maps);
+}
+
+/// Appends how many maps are in memory.
+pub(super) fn write_awake(text: &mut String, MapsAwake { awake, asleep, wakes }: MapsAwake) {
+    let what = "Maps that are served, by state: in memory, or only on disk until a request opens them";
+    let mut family = Family::begin(text, "mrol_maps", Kind::Gauge, what);
+    for (state, count) in [("awake", awake), ("asleep", asleep)] {
+        family.sample(&[("state", &state)], count);
+    }
+    let what = "Maps that requests opened after they had left memory";
+    Family::begin(text, "mrol_map_wakes_total", Kind::Counter, what).sample(&[], wakes);
 }
 
 /// Appends which maps could not be opened.
@@ -258,7 +269,8 @@ impl<'a> Family<'a> {
         for (i, (label, value)) in labels.iter().enumerate() {
             let _ = write!(self.text, "{}{label}=\"{value}\"", if i == 0 { '{' } else { ',' });
         }
-        let _ = writeln!(self.text, "}} {value}");
+        let end = if labels.is_empty() { "" } else { "}" };
+        let _ = writeln!(self.text, "{end} {value}");
     }
 }
 

@@ -48,10 +48,10 @@ pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
     Deletion, DeletionAnswer, DeletionTarget, EventMessage, EventsQuery, FailedScan, Foreground,
     KeepOutAnswer, KeepOutList, LeftViewpoint, ListingRequest, MapFile, MapInfo, MapList, MapStorage,
-    MapVersion, NotSeenSince, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, PointAnswer,
-    PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanEvent, ScanRequest, StatePart,
-    TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget,
-    VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
+    MapVersion, MapsAwake, NotSeenSince, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan,
+    PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanEvent, ScanRequest,
+    StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer,
+    UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
     WatchedViewpoint,
 };
 pub use resources::{Gauges, MemoryReading, Readings, Shortage};

@@ -35,7 +35,9 @@ pub struct MapService {
 #[derive(Debug)]
 pub(super) struct Inner {
     pub(super) settings: ServiceSettings,
-    pub(super) catalog: Catalog,
+    pub(super) catalog: Arc<Catalog>,
+    /// How far the maps of the data folder are opened.
+    pub(super) opening: OpeningProgress,
     pub(super) lanes: Lanes,
     pub(super) budget: Arc<ResourceBudget>,
 }
@@ -47,10 +49,22 @@ impl MapService {
     /// # Errors
     /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
     pub fn open(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
+        let service = Self::begin(settings, progress)?;
+        service.open_maps()?;
+        Ok(service)
+    }
+
+    /// Opens the service before its maps are: [`MapService::open_maps`] opens them, and who asks for one meanwhile waits
+    /// until it is open. Reads files: not for an async thread.
+    ///
+    /// # Errors
+    /// When a setting is out of range, or the data folder cannot be read.
+    pub fn begin(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
         settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
         settings.filter.checked()?;
         let inner = Inner {
-            catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
+            catalog: Catalog::find_maps(settings.data_dir.as_deref(), &settings.store, progress)?.into(),
+            opening: progress.clone(),
             lanes: Lanes::start(&settings)?,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
@@ -185,8 +199,9 @@ impl MapService {
         (&mut submitted.outcome).await.map_err(commit_thread_ended)
     }
 
-    pub(super) fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
-        self.inner.catalog.get(&self.allowed_maps.check(name)?)
+    /// The map of that name, which is opened where it sleeps.
+    pub(super) async fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
+        self.inner.catalog.get(&self.allowed_maps.check(name)?).await
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::limits::Limits;
 use super::observer::Observer;
@@ -47,6 +48,8 @@ pub struct ServiceSettings {
     pub robots: BTreeMap<String, RobotSettings>,
     /// Filter settings of maps whose makers do not say.
     pub filter: FilterSettings,
+    /// Time after which a map that nobody uses leaves memory; never where none.
+    pub sleep_after: Option<Duration>,
 }
 
 /// Settings of a robot, where its requests do not say.

@@ -13,7 +13,7 @@ impl MapService {
     /// # Panics
     /// When there is no such map, or the change fails.
     pub async fn make_change(&self, map: &MapName, change: Change) -> u64 {
-        let map = self.map(map).expect("a map of that name");
+        let map = self.map(map).await.expect("a map of that name");
         let decided = Decided { change, record: None, lent: Vec::new(), pin: None };
         let submission = Submission::Undecided(Box::new(|_, _| Ok(Some(decided))));
         let outcome = map
@@ -29,6 +29,7 @@ impl MapService {
     /// # Panics
     /// When there is none of that name.
     pub fn map_itself(&self, map: &MapName) -> Arc<MultiResolutionMap> {
-        Arc::clone(&self.map(map).expect("a map of that name").map)
+        let awake = self.inner.catalog.all().into_iter().find(|awake| awake.name == *map);
+        Arc::clone(&awake.expect("a map of that name").map)
     }
 }

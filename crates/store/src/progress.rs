@@ -1,13 +1,18 @@
 //! Progress of opening the maps.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use super::error::StoreError;
 
-/// Shared counters of the progress of opening maps; the readiness probe reads them.
+/// Shared counters of the progress of opening maps; the readiness probe reads them. A clone is another handle on the same
+/// counters.
+#[derive(Debug, Clone, Default)]
+pub struct OpeningProgress(Arc<Counters>);
+
 #[derive(Debug, Default)]
-pub struct OpeningProgress {
+struct Counters {
     bytes: AtomicU64,
     bytes_read: AtomicU64,
     maps: AtomicU64,
@@ -32,21 +37,21 @@ impl OpeningProgress {
     /// Returns the present progress.
     pub fn opened(&self) -> Opened {
         Opened {
-            bytes: self.bytes.load(Relaxed),
-            bytes_read: self.bytes_read.load(Relaxed),
-            maps: self.maps.load(Relaxed),
-            maps_open: self.maps_open.load(Relaxed),
+            bytes: self.0.bytes.load(Relaxed),
+            bytes_read: self.0.bytes_read.load(Relaxed),
+            maps: self.0.maps.load(Relaxed),
+            maps_open: self.0.maps_open.load(Relaxed),
         }
     }
 
     /// Cancels the opening.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Relaxed);
+        self.0.cancelled.store(true, Relaxed);
     }
 
     /// True once the opening was cancelled; long operations check it.
     pub(super) fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Relaxed)
+        self.0.cancelled.load(Relaxed)
     }
 
     /// # Errors
@@ -57,15 +62,16 @@ impl OpeningProgress {
 
     /// Adds a map whose files have `bytes` bytes.
     pub(super) fn expect_map(&self, bytes: u64) {
-        self.maps.fetch_add(1, Relaxed);
-        self.bytes.fetch_add(bytes, Relaxed);
+        self.0.maps.fetch_add(1, Relaxed);
+        self.0.bytes.fetch_add(bytes, Relaxed);
     }
 
     pub(super) fn read(&self, bytes: u64) {
-        self.bytes_read.fetch_add(bytes, Relaxed);
+        self.0.bytes_read.fetch_add(bytes, Relaxed);
     }
 
-    pub(super) fn map_is_open(&self) {
-        self.maps_open.fetch_add(1, Relaxed);
+    /// Counts a map as open, for which nothing is left to be read.
+    pub fn map_is_open(&self) {
+        self.0.maps_open.fetch_add(1, Relaxed);
     }
 }

@@ -21,7 +21,8 @@ use crate::telemetry::map_counters::{Family, MapCounters};
 use crate::telemetry::{exposition, families};
 use mrol_map::map::{MapName, RobotName};
 use mrol_service::{
-    End, Ended, JudgedScan, LaneUse, MapInfo, Observer, Outcome, Readings, Reason, Shortage, UnavailableMap,
+    End, Ended, JudgedScan, LaneUse, MapInfo, MapsAwake, Observer, Outcome, Readings, Reason, Shortage,
+    UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -228,12 +229,14 @@ impl Metrics {
         lanes: &[LaneUse],
         names: &[MapName],
         maps: &[MapInfo],
+        awake: MapsAwake,
         unavailable: &[UnavailableMap],
     ) -> String {
         let mut text = self.0.recorder.handle().render();
         exposition::write_counters(&mut text, &self.0.maps.of(names));
         exposition::write_lanes(&mut text, lanes);
         exposition::write_maps(&mut text, maps);
+        exposition::write_awake(&mut text, awake);
         exposition::write_unavailable(&mut text, unavailable);
         text
     }

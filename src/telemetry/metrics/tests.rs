@@ -27,7 +27,7 @@ fn what_was_counted_is_rendered_with_its_description() {
     tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 7 });
     tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 5 });
     metrics.scan(&map, &judged("r", Verdict::LowOverlap));
-    let text = metrics.render(&[], &[map], &[], &[]);
+    let text = metrics.render(&[], &[map], &[], MapsAwake::default(), &[]);
     for line in [
         r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
         r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
@@ -57,10 +57,10 @@ fn a_map_that_is_gone_leaves_no_series() {
         tell(&metrics, map, Outcome::Changed(undone));
     }
     let names = std::slice::from_ref(&kept);
-    let text = metrics.render(&[], names, &[], &[]);
+    let text = metrics.render(&[], names, &[], MapsAwake::default(), &[]);
     assert!(text.contains(r#"map="kept""#) && !text.contains("gone"), "{text}");
     metrics.keep_maps(names);
-    assert!(!metrics.render(&[], &[kept, gone], &[], &[]).contains("gone"));
+    assert!(!metrics.render(&[], &[kept, gone], &[], MapsAwake::default(), &[]).contains("gone"));
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn keys_have_so_many_series_and_no_more() {
         metrics.key_used("http", &format!("key-{key}"));
     }
     metrics.key_used("http", "key-0");
-    let text = metrics.render(&[], &[], &[], &[]);
+    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
     assert_eq!(text.matches("mrol_key_requests_total{").count(), KEY_SERIES_MAX + 1);
     assert!(text.contains(r#"key="(others)"} 2"#) && text.contains(r#"key="key-0"} 2"#));
 }
@@ -83,7 +83,7 @@ fn robots_beyond_the_bound_are_counted_together() {
     };
     (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
     scan(0);
-    let text = metrics.render(&[], &[], &[], &[]);
+    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
     assert_eq!(text.matches("mrol_robot_scans_total{").count(), Metrics::ROBOTS_MAX + 1);
     for line in [
         r#"{robot="r0",verdict="accepted"} 2"#,
@@ -99,9 +99,13 @@ fn a_connection_is_open_until_it_is_dropped() {
     let metrics = Metrics::new().unwrap();
     let open = metrics.connection_opened("http");
     metrics.connection_refused("http");
-    assert!(metrics.render(&[], &[], &[], &[]).contains(r#"mrol_connections_open{listener="http"} 1"#));
+    assert!(
+        metrics
+            .render(&[], &[], &[], MapsAwake::default(), &[])
+            .contains(r#"mrol_connections_open{listener="http"} 1"#)
+    );
     drop(open);
-    let text = metrics.render(&[], &[], &[], &[]);
+    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
     for line in ["open", "accepted_total", "refused_total"]
         .map(|name| format!("mrol_connections_{name}{{listener=\"http\"}}"))
     {
@@ -114,5 +118,5 @@ fn a_connection_is_open_until_it_is_dropped() {
 fn two_servers_count_apart() {
     let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
     one.request("http", "GetMap", "200", Duration::ZERO);
-    assert!(!other.render(&[], &[], &[], &[]).contains("GetMap"));
+    assert!(!other.render(&[], &[], &[], MapsAwake::default(), &[]).contains("GetMap"));
 }

@@ -156,6 +156,7 @@ impl From<MapInfo> for pb::MapInfo {
             trajectory_bytes: info.trajectory_bytes as u64,
             viewpoints: info.viewpoints as u64,
             viewpoint_bytes: info.viewpoint_bytes as u64,
+            asleep: info.is_asleep,
         }
     }
 }
@@ -186,6 +187,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             trajectory_bytes: count_from(info.trajectory_bytes),
             viewpoints: count_from(info.viewpoints),
             viewpoint_bytes: count_from(info.viewpoint_bytes),
+            is_asleep: info.asleep,
         })
     }
 }

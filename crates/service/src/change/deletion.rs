@@ -32,7 +32,7 @@ impl MapService {
         deletion: Deletion,
     ) -> Result<DeletionAnswer, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             map.check_level(deletion.level)?;
             match &deletion.target {
                 DeletionTarget::Points(points) => self.limits().check_points(points.len())?,

@@ -58,7 +58,7 @@ impl MapService {
     /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
     pub async fn list_keep_outs(&self, map: &MapName) -> Result<KeepOutList, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             self.inner.lanes.reads.run(&self.asker, move |_| map.list_keep_outs()).await
         };
         self.observed("ListKeepOuts", Some(map), work, |_| Outcome::Read).await
@@ -70,7 +70,7 @@ impl MapService {
         change: KeepOutChange,
         request_id: Option<RequestId>,
     ) -> Result<KeepOutAnswer, ServiceError> {
-        let map = self.map(map)?;
+        let map = self.map(map).await?;
         let request =
             request_id.map(|id| Request { id, digest: digest(&change), caller: self.caller.clone() });
         let (inner, record) = (Arc::clone(&self.inner), KeepOutRecord { change, request });

@@ -160,7 +160,7 @@ mod tests {
         let (service, map) = service_with(settings, &[NEVER_YET, NEVER_YET]).await;
         std::fs::rename(folder.join("maps"), data.path().join("away")).unwrap();
         assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
-        let hosted = service.map(&map).unwrap();
+        let hosted = service.map(&map).await.unwrap();
         assert!(hosted.commit_queue.stopped().is_some() && !hosted.has_expired(i64::MAX));
         assert!(
             !hosted.keep_out_expiry.is_put_off.load(Ordering::Relaxed),
@@ -173,7 +173,7 @@ mod tests {
     #[tokio::test(flavor = "multi_thread")]
     async fn a_map_that_is_being_asked_is_left_out_and_keeps_no_other_waiting() {
         let (service, map) = service_with(ServiceSettings::default(), &[NEVER_YET]).await;
-        let hosted = service.map(&map).unwrap();
+        let hosted = service.map(&map).await.unwrap();
         let turn = hosted.keep_out_expiry.lock.lock().await;
         let left_out = tokio::time::timeout(Duration::from_secs(20), service.expire_keep_outs(i64::MAX));
         assert_eq!(left_out.await.unwrap(), 0);

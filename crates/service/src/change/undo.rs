@@ -67,7 +67,7 @@ impl MapService {
     pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let work = async {
             self.scans.permit_undo(&undo.target)?;
-            let (map, undo) = (self.map(map)?, Arc::new(undo));
+            let (map, undo) = (self.map(map).await?, Arc::new(undo));
             let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             // Until its outcome is known: what was withdrawn before it is then what it found.

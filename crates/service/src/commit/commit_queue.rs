@@ -52,6 +52,8 @@ struct State {
     is_closed: bool,
     /// A defect ended the worker: who comes now is told so.
     is_broken: bool,
+    /// Dropped when the worker is gone for good.
+    at_work: Option<oneshot::Sender<()>>,
 }
 
 impl std::fmt::Debug for Inbox {
@@ -81,6 +83,7 @@ impl CommitQueue {
             is_alarm_set: false,
             is_closed: false,
             is_broken: false,
+            at_work: None,
         };
         let inbox = Arc::new_cyclic(|this| Inbox {
             state: Mutex::new(Rank::Brief, state),
@@ -135,6 +138,14 @@ impl CommitQueue {
         outcome
     }
 
+    /// Takes nothing any more; the receiver hears when the changes that wait are made and synced, and the map's folder is
+    /// not used any more.
+    pub(crate) fn close(self) -> oneshot::Receiver<()> {
+        let (at_work, done) = oneshot::channel();
+        self.inbox.state.lock().at_work = Some(at_work);
+        done
+    }
+
     /// How long groups of changes took to become durable and visible.
     pub(crate) fn durations(&self) -> Durations {
         self.durations.read()
@@ -186,6 +197,7 @@ impl Turn for Inbox {
         let mut state = self.state.lock();
         let Some(worker) = state.worker.take() else {
             state.is_due = false;
+            drop(state.at_work.take());
             return false;
         };
         let waiting = state.waiting.group(GROUP_MAX);
@@ -223,8 +235,11 @@ impl Inbox {
             return true;
         }
         if state.is_closed {
+            let at_work = state.at_work.take();
             drop(state);
             worker.sync();
+            drop(worker);
+            drop(at_work);
             return false;
         }
         let alarm = worker.due_at().filter(|_| !state.is_alarm_set);
@@ -263,7 +278,7 @@ impl Inbox {
     fn give_up(&self) -> bool {
         let mut state = self.state.lock();
         (state.is_broken, state.is_due) = (true, false);
-        let gone = std::mem::take(&mut state.waiting);
+        let gone = (std::mem::take(&mut state.waiting), state.at_work.take());
         drop(state);
         drop(gone);
         false

@@ -1,6 +1,7 @@
 //! The operations on maps as a whole.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::Bytes;
 
@@ -10,10 +11,11 @@ use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::maps::{HostedMap, Saving};
 use crate::observer::{Change, Outcome};
-use crate::request::{MapFile, MapInfo, UnavailableMap};
+use crate::request::{MapFile, MapInfo, MapsAwake, UnavailableMap};
 use mrol_map::map::{MapName, MapSettings};
 use mrol_map::sync::polled_by_runtime;
 use mrol_map::util::StopSignal;
+use mrol_store::Opened;
 
 /// Absent neighbors of occupied voxels on which a description measures each level's false positives.
 const RATE_SAMPLES: usize = 4096;
@@ -32,7 +34,7 @@ impl MapService {
         let map = &name.clone();
         let work = async {
             let name = self.allowed_maps.check(&name)?;
-            let is_new = self.inner.catalog.get(&name).is_err();
+            let is_new = !self.inner.catalog.has(&name);
             let settings = settings.checked()?;
             if is_new {
                 self.inner.budget.check_to_grow()?;
@@ -59,20 +61,23 @@ impl MapService {
     /// `NotFound` without such a map.
     pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
         let work = async {
-            let map = self.map(name)?;
+            let map = self.map(name).await?;
             let sightings = map.robots.sightings.to_vec();
             Ok(MapInfo { sightings, ..self.describe(map).await? })
         };
         self.observed("GetMap", Some(name), work, |_| Outcome::Read).await
     }
 
-    /// Describes all maps that the caller may name, by name.
+    /// Describes all maps that the caller may name, by name, those that sleep as they fell asleep. While maps are being
+    /// opened, waits until they are.
     ///
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let work = async {
-            let maps = self.inner.catalog.within(&self.allowed_maps);
+            self.inner.catalog.all_open().await;
+            // Those that sleep are not woken.
+            let (maps, mut asleep) = self.inner.catalog.listed_within(&self.allowed_maps);
             let describe = move |stop: StopSignal<'_>| {
                 let described = maps.iter().map(|map| {
                     stop.give_way();
@@ -80,14 +85,19 @@ impl MapService {
                 });
                 described.collect()
             };
-            self.inner.lanes.reads.run(&self.asker, describe).await?
+            let described: Result<Vec<MapInfo>, _> =
+                self.inner.lanes.reads.run(&self.asker, describe).await?;
+            let mut all = described?;
+            all.append(&mut asleep);
+            all.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+            Ok(all)
         };
         self.observed("ListMaps", None, work, |_| Outcome::Read).await
     }
 
     /// The names of the maps that the caller may name.
     pub fn map_names(&self) -> Vec<MapName> {
-        self.inner.catalog.within(&self.allowed_maps).iter().map(|map| map.name.clone()).collect()
+        self.inner.catalog.names_within(&self.allowed_maps)
     }
 
     /// The maps that take no changes since their journal failed, by name, with the reason.
@@ -99,6 +109,43 @@ impl MapService {
     /// The maps that could not be opened, by name, with the reason and what helps. Their names are taken.
     pub fn unavailable_maps(&self) -> Vec<UnavailableMap> {
         self.inner.catalog.unavailable_within(&self.allowed_maps)
+    }
+
+    /// Opens the maps of the data folder side by side, and serves each as soon as it is open; where maps sleep, they fall
+    /// asleep as soon as they have been looked at. Not for an async thread.
+    ///
+    /// # Errors
+    /// Once the progress with which the service was begun is cancelled.
+    pub fn open_maps(&self) -> Result<(), ServiceError> {
+        let (inner, sleeps) = (&self.inner, self.inner.settings.sleep_after.is_some());
+        inner.catalog.open_all(&inner.opening, |name| {
+            if sleeps {
+                inner.catalog.put_to_sleep(name, Duration::ZERO, &inner.budget);
+            }
+        })
+    }
+
+    /// How far the maps of the data folder are opened; none once that is done.
+    pub fn opening(&self) -> Option<Opened> {
+        (!self.inner.catalog.are_open()).then(|| self.inner.opening.opened())
+    }
+
+    /// Saves the maps that nobody has asked for for `sleep_after`, and that nobody uses or watches, and takes them out of
+    /// memory; how many. To be called every now and then.
+    pub async fn put_unused_to_sleep(&self) -> usize {
+        let Some(sleep_after) = self.inner.settings.sleep_after else { return 0 };
+        let mut asleep = 0;
+        for name in self.inner.catalog.unused_for(sleep_after) {
+            let inner = Arc::clone(&self.inner);
+            let put = move || inner.catalog.put_to_sleep(&name, sleep_after, &inner.budget);
+            asleep += usize::from(tokio::task::spawn_blocking(put).await.unwrap_or(false));
+        }
+        asleep
+    }
+
+    /// How many maps are in memory, and how often one was opened again.
+    pub fn maps_awake(&self) -> MapsAwake {
+        self.inner.catalog.awake()
     }
 
     /// Takes a map out, in memory and on disk.
@@ -122,7 +169,7 @@ impl MapService {
     /// file would be larger than `map_file_bytes_max`, so that nobody could restore it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let work = async {
-            let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
+            let (map, inner) = (self.map(name).await?, Arc::clone(&self.inner));
             self.inner
                 .lanes
                 .map_files

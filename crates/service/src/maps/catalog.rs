@@ -2,20 +2,22 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
+use tokio::sync::{Semaphore, watch};
 use uuid::Uuid;
 
 use super::built_map::BuiltMap;
 use super::hosted_map::HostedMap;
-use super::named::Named;
-use super::opening::{not_stored, open_all};
+use super::named::{Named, Place};
+use super::opening::{find_all, not_stored, openings_at_once};
 use crate::caller::{AllowedMaps, Reachable};
 use crate::commit::CommitThreads;
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::request::{MapVersion, UnavailableMap};
 use mrol_map::bloom::FilterSettings;
-use mrol_map::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
+use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::sync::{Rank, RwLock};
 use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
 
@@ -25,30 +27,43 @@ const TURN_MAX: Duration = Duration::from_secs(10);
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
 pub(crate) struct Catalog {
-    maps: RwLock<Named>,
-    data_dir: Option<Arc<DataDir>>,
-    settings: StoreSettings,
-    commit_threads: Arc<CommitThreads>,
+    pub(super) maps: RwLock<Named>,
+    pub(super) data_dir: Option<Arc<DataDir>>,
+    pub(super) settings: StoreSettings,
+    pub(super) commit_threads: Arc<CommitThreads>,
+    /// How many maps requests open at once.
+    pub(super) openings: Arc<Semaphore>,
+    /// How often a request opened a map that slept.
+    pub(super) wakes: AtomicU64,
+    /// True once every map of the data folder was opened, or could not be.
+    pub(super) are_open: watch::Sender<bool>,
     writing: tokio::sync::Mutex<()>,
 }
 
 impl Catalog {
-    /// Opens the maps of `data_dir`, as many as can be opened; without one, nothing outlives the process.
-    pub(crate) fn open(
+    /// Finds the maps of `data_dir`, none of which is open yet; without a folder, nothing outlives the process.
+    pub(crate) fn find_maps(
         data_dir: Option<&Path>,
         settings: &StoreSettings,
         progress: &OpeningProgress,
     ) -> Result<Self, ServiceError> {
         let open = |path: &Path| DataDir::open(path, settings.clone());
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
-        let commit_threads = CommitThreads::start()?;
-        let open = |data_dir: &DataDir| open_all(data_dir, &commit_threads, settings, progress);
-        let maps = data_dir.as_ref().map(open).transpose()?;
-        let (maps, data_dir) = (RwLock::new(Rank::Brief, maps.unwrap_or_default()), data_dir.map(Arc::new));
-        Ok(Self { maps, data_dir, settings: settings.clone(), commit_threads, writing: Default::default() })
+        let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
+        Ok(Self {
+            maps: RwLock::new(Rank::Brief, maps.unwrap_or_default()),
+            data_dir: data_dir.map(Arc::new),
+            settings: settings.clone(),
+            commit_threads: CommitThreads::start()?,
+            openings: Arc::new(Semaphore::new(openings_at_once())),
+            wakes: AtomicU64::new(0),
+            are_open: watch::Sender::new(false),
+            writing: Default::default(),
+        })
     }
 
-    pub(crate) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
+    /// The map of that name as it is served; whoever asks uses it from then on.
+    pub(super) fn look_up(&self, name: &Reachable) -> Result<Place, ServiceError> {
         let name = name.name();
         let maps = self.maps.read();
         let missing = || match maps.unavailable.get(name) {
@@ -58,19 +73,28 @@ impl Catalog {
                 ServiceError::new(Reason::MapNotFound, message)
             }
         };
-        maps.open.get(name).cloned().ok_or_else(missing)
+        let place = maps.find(name).ok_or_else(missing)?;
+        if let Place::Awake(map) = &place {
+            map.note_use();
+        }
+        Ok(place)
+    }
+
+    /// True where there is a map of that name that is served.
+    pub(crate) fn has(&self, name: &Reachable) -> bool {
+        self.maps.read().find(name.name()).is_some()
     }
 
     /// The map of that name; none where the name is free.
-    fn find(&self, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
-        match self.get(name) {
+    async fn find(self: &Arc<Self>, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
+        match self.get(name).await {
             Ok(map) => Ok(Some(map)),
             Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// The maps that a caller may name.
+    /// The maps in memory that a caller may name.
     pub(crate) fn within(&self, allowed_maps: &AllowedMaps) -> Vec<Arc<HostedMap>> {
         self.maps.read().open.values().filter(|map| allowed_maps.covers(&map.name)).cloned().collect()
     }
@@ -89,24 +113,35 @@ impl Catalog {
         self.commit_threads.relieve();
     }
 
+    /// The names of the maps that are served, and that a caller may name.
+    pub(crate) fn names_within(&self, allowed_maps: &AllowedMaps) -> Vec<MapName> {
+        let maps = self.maps.read();
+        let mut names: Vec<MapName> = maps.open.keys().chain(maps.asleep.keys()).cloned().collect();
+        drop(maps);
+        names.retain(|name| allowed_maps.covers(name));
+        names.sort_unstable();
+        names
+    }
+
+    /// The maps in memory.
     pub(crate) fn all(&self) -> Vec<Arc<HostedMap>> {
         self.maps.read().open.values().cloned().collect()
     }
 
     /// The map of that name; true when it was not there.
     pub(crate) async fn create(
-        &self,
+        self: &Arc<Self>,
         name: Reachable,
         settings: MapSettings,
         maps_max: usize,
     ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
         // One that is there already waits for nobody's disk.
-        let found = self.find(&name)?;
+        let found = self.find(&name).await?;
         if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
         }
         let _writing = self.turn_to_write().await?;
-        let found = self.find(&name)?;
+        let found = self.find(&name).await?;
         if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
         }
@@ -118,7 +153,7 @@ impl Catalog {
     /// A map that was built of a map file under a name that is free; with `replace` under any, where the map that was
     /// there is kept under another name. Beside it the version of the map that had the name.
     pub(crate) async fn restore(
-        &self,
+        self: &Arc<Self>,
         name: Reachable,
         built: BuiltMap,
         maps_max: usize,
@@ -126,7 +161,7 @@ impl Catalog {
     ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
-        let old = self.find(&name)?;
+        let old = self.find(&name).await?;
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
         let build = move || Ok(map);
@@ -145,13 +180,23 @@ impl Catalog {
         maps_max: usize,
         replace: bool,
     ) -> Result<(), ServiceError> {
-        if self.find(name)?.is_some() && !replace {
+        let is_there = self.is_there(name)?;
+        if is_there && !replace {
             let name = name.name();
             let message =
                 format!("map {name} exists: delete it first, restore under another name, or replace it");
             return Err(ServiceError::new(Reason::MapExists, message));
         }
         self.check_room(maps_max)
+    }
+
+    /// True where there is a map of that name.
+    fn is_there(&self, name: &Reachable) -> Result<bool, ServiceError> {
+        match self.look_up(name) {
+            Ok(_) => Ok(true),
+            Err(error) if error.code() == ErrorCode::NotFound => Ok(false),
+            Err(error) => Err(error),
+        }
     }
 
     /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up who has it.
@@ -167,8 +212,7 @@ impl Catalog {
     }
 
     fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
-        let maps = self.maps.read();
-        let count = maps.open.len() + maps.unavailable.len();
+        let count = self.maps.read().len();
         if count < maps_max {
             return Ok(());
         }
@@ -197,64 +241,10 @@ impl Catalog {
         Ok(map)
     }
 
-    /// Puts another map in the place of `old`, which gets a name of its own; the caller holds `writing`.
-    async fn replace(
-        &self,
-        old: Arc<HostedMap>,
-        uuid: Uuid,
-        build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
-    ) -> Result<Arc<HostedMap>, ServiceError> {
-        let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
-        let threads = Arc::clone(&self.commit_threads);
-        let taken: Vec<MapName> = {
-            let maps = self.maps.read();
-            maps.open.keys().chain(maps.unavailable.keys()).cloned().collect()
-        };
-        let exchanged = blocking(move || {
-            let map = build()?;
-            // Its revision, and so its new name, is known from now on.
-            old.commit_queue.end_replaced();
-            let synced = old.folder.as_ref().map_or(Ok(()), |folder| folder.sync()).map_err(not_stored);
-            let kept = name_of_replaced(&old.name, old.map.revision(), &taken);
-            let exchange = || {
-                let kept = synced.and(kept)?;
-                let replace = |data_dir: Arc<DataDir>| match &old.folder {
-                    Some(folder) => {
-                        let first = Snapshot::of(&map, uuid);
-                        data_dir.replace(&old.name, folder, &kept, &first).map(Some).map_err(not_stored)
-                    }
-                    None => Ok(None),
-                };
-                data_dir.map_or(Ok(None), replace).map(|folder| (kept, folder))
-            };
-            match exchange() {
-                Ok((kept, folder)) => {
-                    let kept = old.again_as(&threads, kept, &settings);
-                    let new = HostedMap::new(&threads, old.name.clone(), uuid, map, folder, &settings);
-                    Ok((Arc::new(new), Arc::new(kept), None))
-                }
-                Err(error) => {
-                    let old = Arc::new(old.again_as(&threads, old.name.clone(), &settings));
-                    Ok((Arc::clone(&old), old, Some(error)))
-                }
-            }
-        });
-        let (there, kept, error): (Arc<HostedMap>, Arc<HostedMap>, Option<ServiceError>) = exchanged.await?;
-        let mut maps = self.maps.write();
-        maps.open.insert(kept.name.clone(), Arc::clone(&kept));
-        maps.open.insert(name.clone(), Arc::clone(&there));
-        drop(maps);
-        if let Some(error) = error {
-            return Err(error);
-        }
-        tracing::info!(map = %name, kept = %kept.name, "replaced");
-        Ok(there)
-    }
-
     /// Takes a map out; its last version.
-    pub(crate) async fn delete(&self, name: &Reachable) -> Result<MapVersion, ServiceError> {
+    pub(crate) async fn delete(self: &Arc<Self>, name: &Reachable) -> Result<MapVersion, ServiceError> {
         let _writing = self.turn_to_write().await?;
-        let map = self.get(name)?;
+        let map = self.get(name).await?;
         let folder = map.folder.clone();
         let removed =
             self.on_disk(move |data_dir| folder.map_or(Ok(()), |folder| data_dir.remove(&folder))).await;
@@ -314,22 +304,8 @@ fn unavailable(name: &MapName, reason: &str) -> ServiceError {
     ServiceError::new(Reason::MapUnavailable, message)
 }
 
-/// The name that a map gets whose name another takes: `NAME-replaced-REVISION`, cut to fit.
-fn name_of_replaced(name: &MapName, revision: u64, taken: &[MapName]) -> Result<MapName, ServiceError> {
-    let candidate = |again: u32| {
-        let again = if again == 1 { String::new() } else { format!("-{again}") };
-        let end = format!("-replaced-{revision}{again}");
-        let start: String = name.as_str().chars().take(NAME_LENGTH_MAX - end.len()).collect();
-        MapName::new(&format!("{start}{end}"))
-    };
-    let mut names = (1..=taken.len() as u32 + 1).map(candidate);
-    let free = names.find(|name| name.as_ref().map_or(true, |name| !taken.contains(name)));
-    let none = || ServiceError::new(Reason::MapExists, format!("no name is free for {name}"));
-    Ok(free.ok_or_else(none)??)
-}
-
 /// Does something on a thread that may block.
-async fn blocking<T: Send + 'static>(
+pub(super) async fn blocking<T: Send + 'static>(
     job: impl FnOnce() -> Result<T, ServiceError> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::task::spawn_blocking(job).await;
@@ -368,19 +344,6 @@ mod tests {
 
     const MAPS_MAX: usize = 8;
 
-    #[test]
-    fn the_name_of_a_replaced_map_fits_and_is_free() {
-        let name = |text: &str| MapName::new(text).unwrap();
-        let office = name("office");
-        let first = name_of_replaced(&office, 41, std::slice::from_ref(&office)).unwrap();
-        assert_eq!(first, name("office-replaced-41"));
-        let second = name_of_replaced(&office, 41, &[office.clone(), first]).unwrap();
-        assert_eq!(second, name("office-replaced-41-2"));
-        let long = name(&"a".repeat(NAME_LENGTH_MAX));
-        let cut = name_of_replaced(&long, 1 << 53, &[]).unwrap();
-        assert_eq!(cut.as_str().len(), NAME_LENGTH_MAX);
-        assert!(cut.as_str().ends_with("a-replaced-9007199254740992"), "{cut:?}");
-    }
     fn named(name: &str) -> Reachable {
         AllowedMaps::Every.check(&MapName::new(name).unwrap()).unwrap()
     }
@@ -401,7 +364,8 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
         let progress = OpeningProgress::default();
-        let catalog = Catalog::open(None, &StoreSettings::default(), &progress).unwrap();
+        let catalog = Catalog::find_maps(None, &StoreSettings::default(), &progress).unwrap();
+        let catalog = Arc::new(catalog);
         let settings = MapSettings::new(0.1, 4);
         catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
         let turn = catalog.writing.lock().await;

@@ -1,8 +1,10 @@
 //! A map under a name: what the service keeps about it besides the map itself.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use tokio::sync::oneshot;
 use uuid::Uuid;
 
 use super::followers::Followers;
@@ -35,6 +37,21 @@ pub(crate) struct HostedMap {
     pub(crate) undo_lock: Arc<tokio::sync::Mutex<()>>,
     pub(super) snapshots: Snapshots,
     pub(crate) keep_out_expiry: KeepOutExpiry,
+    last_use: LastUse,
+}
+
+/// What is left of a map that was closed.
+pub(super) struct Closed {
+    pub(super) robots: Robots,
+    /// Hears when its files are closed.
+    pub(super) done: oneshot::Receiver<()>,
+}
+
+/// When a map was last asked for: milliseconds since it was opened.
+#[derive(Debug)]
+struct LastUse {
+    opened: Instant,
+    at_ms: AtomicU64,
 }
 
 /// Seed of the sample on which false positives are measured: the same map gives the same figures.
@@ -55,15 +72,18 @@ impl HostedMap {
         Self::of_shared(threads, name, uuid, map, history, folder.map(Arc::new), settings)
     }
 
-    /// Takes a map into service that was opened; `threads` make its changes.
+    /// Takes a map into service that was opened, with what is known of its robots; `threads` make its changes.
     pub(super) fn opened(
         threads: &Arc<CommitThreads>,
         name: MapName,
         opened: OpenedMap,
+        robots: Robots,
         settings: &StoreSettings,
     ) -> Self {
         let OpenedMap { uuid, map, history, folder, .. } = opened;
-        Self::of_shared(threads, name, uuid, Arc::new(map), history, Some(Arc::new(folder)), settings)
+        let folder = Some(Arc::new(folder));
+        let hosted = Self::of_shared(threads, name, uuid, Arc::new(map), history, folder, settings);
+        Self { robots, ..hosted }
     }
 
     /// This map under the name `name`, once it has ended under its own.
@@ -102,7 +122,33 @@ impl HostedMap {
             undo_lock: Arc::default(),
             snapshots: Snapshots::default(),
             keep_out_expiry: KeepOutExpiry::default(),
+            last_use: LastUse { opened: Instant::now(), at_ms: AtomicU64::new(0) },
         }
+    }
+
+    /// Notes that somebody asks for the map.
+    pub(super) fn note_use(&self) {
+        let LastUse { opened, at_ms } = &self.last_use;
+        at_ms.store(opened.elapsed().as_millis() as u64, Ordering::Relaxed);
+    }
+
+    /// True where nobody has asked for the map for so long.
+    pub(super) fn is_unused_for(&self, duration: Duration) -> bool {
+        let LastUse { opened, at_ms } = &self.last_use;
+        let last = Duration::from_millis(at_ms.load(Ordering::Relaxed));
+        opened.elapsed().saturating_sub(last) >= duration
+    }
+
+    /// True where the map is at `revision`, and nobody but its worker uses its files.
+    pub(super) fn may_close(&self, revision: u64) -> bool {
+        const OWN: usize = 2;
+        self.map.revision() == revision && self.folder.as_ref().is_some_and(|it| Arc::strong_count(it) == OWN)
+    }
+
+    /// Takes the map out of service. Its files are closed on a thread for commits.
+    pub(super) fn close(self) -> Closed {
+        let Self { commit_queue, robots, .. } = self;
+        Closed { robots, done: commit_queue.close() }
     }
 
     /// Refuses changes that would be refused in the end, before any work is done for them.
@@ -194,6 +240,7 @@ impl HostedMap {
             viewpoints: described.viewpoints,
             viewpoint_bytes: described.viewpoint_bytes,
             storage,
+            is_asleep: false,
         })
     }
 

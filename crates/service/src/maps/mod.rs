@@ -1,9 +1,11 @@
 //! The maps by name, and what the service keeps about each.
 //!
 //! A [`Catalog`] has a [`HostedMap`] for each name. What a hosted map is made of stands beside it: `followers`,
-//! `robots`, `snapshots`, `keep_out_expiry`. What is done with a hosted map is in the rooms above, as further
+//! `robots`, `snapshots`, `keep_out_expiry`. A map that nobody uses leaves memory (`sleeping`, `asleep`). What is done with a
+//! hosted map is in the rooms above, as further
 //! `impl HostedMap` blocks.
 
+mod asleep;
 mod built_map;
 mod catalog;
 mod event_log;
@@ -14,9 +16,12 @@ mod keep_out_expiry;
 mod named;
 mod newcomers;
 mod opening;
+mod replacing;
 mod robots;
 mod saving;
+mod sleeping;
 mod snapshots;
+mod start;
 
 pub(crate) use built_map::BuiltMap;
 pub(crate) use catalog::Catalog;

@@ -43,7 +43,7 @@ impl MapService {
         question: Q,
     ) -> Result<Answered<Q::Answer>, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             let Asked { level, min_revision, map_uuid, .. } = *question.asked();
             let question = self.checked(question).await?;
             map.check_level(level)?;
@@ -192,7 +192,7 @@ mod tests {
         let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
         let name = MapName::new("a").unwrap();
         service.create_map(name.clone(), MapSettings::new(0.1, 1)).await.unwrap();
-        let map = Arc::clone(&service.map(&name).unwrap().map);
+        let map = Arc::clone(&service.map(&name).await.unwrap().map);
         let put = |index| {
             map.committer().exchange(&VoxelSet::default(), &VoxelKey::new(index).into_iter().collect());
         };

@@ -30,7 +30,7 @@ impl MapService {
     /// `NotFound`.
     pub async fn get_block(&self, map: &MapName, request: BlockRequest) -> Result<BlockAnswer, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             map.check_level(request.level)?;
             let inner = self.inner.clone();
             let make = move |stop: StopSignal<'_>| {

@@ -22,7 +22,7 @@ impl MapService {
         request: ListingRequest,
     ) -> Result<VoxelListing, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             map.check_level(request.level)?;
             let most = self.limits().listed_voxels_max;
             let list = move |stop: StopSignal<'_>| match request.count_only {

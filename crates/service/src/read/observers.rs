@@ -38,7 +38,7 @@ impl MapService {
         request: ObserversRequest,
     ) -> Result<ObserversAnswer, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             map.check_level(request.level)?;
             let voxel = map.observed_voxel(&request)?;
             let folder = map.folder.clone().ok_or_else(|| map.no_journal("a list of observers"))?;
@@ -267,7 +267,8 @@ mod tests {
         assert_eq!(revision, restored.version.revision + 1);
         assert_eq!(observers(&service, [0; 3], 0).await, (vec![revision], true));
 
-        let (hosted, folder) = (service.map(&map()).unwrap(), service.map(&map()).unwrap().folder.clone());
+        let (hosted, folder) =
+            (service.map(&map()).await.unwrap(), service.map(&map()).await.unwrap().folder.clone());
         let search = |stop| {
             let folder = folder.as_ref().unwrap();
             Search { map: &hosted, folder, voxel: key([0; 3]), level: 0, stop }
@@ -291,7 +292,7 @@ mod tests {
             let (undone, kept) = (insert(&service, 1, &[[0; 3]]).await, insert(&service, 2, &[[0; 3]]).await);
             let undo = Undo { target: UndoTarget::Revision(undone), request_id: None };
             let head = service.undo(&map(), undo).await.unwrap().version.revision;
-            let hosted = service.map(&map()).unwrap();
+            let hosted = service.map(&map()).await.unwrap();
             let spacing = &hosted.folder.as_ref().unwrap().settings().trajectory_spacing;
             hosted.map.committer().thin(head + 1, spacing);
             assert!(hosted.map.trajectory_and_version().0.withdrawn().is_empty());

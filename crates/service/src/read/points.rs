@@ -38,7 +38,7 @@ impl MapService {
     pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ServiceError> {
         let (lookup, points, keep_out) = (query.lookup, query.points.len(), query.keep_out);
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             self.limits().check_points(query.points.len())?;
             map.check_level(query.level)?;
             map.check_uuid(query.map_uuid)?;

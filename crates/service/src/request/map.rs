@@ -37,7 +37,7 @@ pub struct MapInfo {
     /// The last scan of each robot since the server was started, by name, whether it was accepted or not; of a list of
     /// maps, none.
     pub sightings: Vec<Sighting>,
-    /// Bytes of memory of the exact sets of all levels.
+    /// Bytes of memory of the exact sets of all levels; this and the bytes below are what a map that sleeps had in memory.
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments, which alignments are refined with.
     pub moment_bytes: usize,
@@ -52,6 +52,19 @@ pub struct MapInfo {
     pub viewpoint_bytes: usize,
     /// How it is kept; not at all without a data folder.
     pub storage: Option<MapStorage>,
+    /// True of a map that is not in memory: what is told of it is from when it left, and the next request opens it.
+    pub is_asleep: bool,
+}
+
+/// How many maps are in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MapsAwake {
+    /// Maps in memory.
+    pub awake: usize,
+    /// Maps that are not in memory: the next request for one opens it.
+    pub asleep: usize,
+    /// How often a request opened a map that slept, since the server was started.
+    pub wakes: u64,
 }
 
 /// How a map is kept.

@@ -32,7 +32,7 @@ impl MapService {
         map: &MapName,
         query: EventsQuery,
     ) -> Result<Vec<Arc<ScanEvent>>, ServiceError> {
-        let work = async { Ok(self.map(map)?.robots.events.list(&query)) };
+        let work = async { Ok(self.map(map).await?.robots.events.list(&query)) };
         self.observed("ListEvents", Some(map), work, |_| Outcome::Read).await
     }
 
@@ -42,7 +42,7 @@ impl MapService {
     /// `NotFound`.
     pub async fn watch_events(&self, map: &MapName, query: EventsQuery) -> Result<EventWatch, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             let limits = self.limits();
             let heartbeat = Duration::from_secs_f64(limits.watch_heartbeat_s);
             let unread_max_s = limits.watch_unread_max_s;

@@ -27,7 +27,7 @@ impl MapService {
             self.scans.permit(&scan.robot)?;
             let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
             self.scans.permit_carving(&scan.robot, scan.carve, by_settings)?;
-            let (map, scan) = (self.map(map)?, Arc::new(scan));
+            let (map, scan) = (self.map(map).await?, Arc::new(scan));
             let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
             let judged = self.judge(&map, &scan).await;
             pending.end(&judged);
@@ -97,7 +97,7 @@ impl MapService {
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let work = async {
             self.scans.permit(&scan.robot)?;
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             scan.check_alignment()?;
             scan.check_points(self.limits())?;
             let inner = Arc::clone(&self.inner);

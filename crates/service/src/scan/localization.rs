@@ -168,7 +168,7 @@ impl MapService {
         request: LocalizationRequest,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             let request = request.within(self.limits())?;
             let inner = Arc::clone(&self.inner);
             let search =

@@ -30,7 +30,7 @@ impl MapService {
         query: TrajectoryQuery,
     ) -> Result<TrajectoryAnswer, ServiceError> {
         let work = async {
-            let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
+            let (map, most) = (self.map(map).await?, self.limits().page(query.limit)?);
             let page_of = move |_: StopSignal<'_>| {
                 let (trajectory, version) = map.map.trajectory_and_version();
                 page(&trajectory, map.version(version), &query, most)
@@ -52,7 +52,7 @@ impl MapService {
     ) -> Result<TrajectoryPieces, ServiceError> {
         let work = async {
             let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             let shared = Arc::clone(&map);
             let copy = move |_: StopSignal<'_>| shared.map.trajectory_and_version();
             let copy = self.inner.lanes.queries.run(&self.asker, copy).await?;

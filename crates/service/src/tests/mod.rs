@@ -3,3 +3,4 @@
 mod looks;
 #[cfg(feature = "shuttle")]
 mod modeled;
+mod sleeping;

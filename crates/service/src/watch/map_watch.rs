@@ -29,7 +29,7 @@ impl MapService {
     /// `NotFound` without such a map; `InvalidArgument` for a level that is none.
     pub async fn watch(&self, map: &MapName, request: WatchRequest) -> Result<Watch, ServiceError> {
         let work = async {
-            let map = self.map(map)?;
+            let map = self.map(map).await?;
             if let WatchForm::Deltas { level } = request.form {
                 map.check_level(level)?;
             }

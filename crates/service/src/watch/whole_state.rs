@@ -88,7 +88,7 @@ mod tests {
             assert!(matches!(&told, WatchEvent::State(part) if !part.voxels.is_empty()), "{told:?}");
             watches.push(watch);
         }
-        let hosted = service.map(&map).unwrap();
+        let hosted = service.map(&map).await.unwrap();
         let state = hosted.followers.whole_states.get(None).expect("it is being told");
         assert_eq!(std::sync::Arc::strong_count(&state), WATCHERS as usize + 1);
         drop(watches);

@@ -77,6 +77,8 @@ class MapInfo(Versioned):
     """Scans that were accepted and not undone."""
     robots: tuple[str, ...]
     sightings: tuple[Sighting, ...]
+    asleep: bool
+    """Whether the map is not in memory: what is told of it is from when it left, and the next request opens it."""
     set_bytes: int
     moment_bytes: int
     trajectory_bytes: int
@@ -116,6 +118,7 @@ def map_info(fields: Fields) -> MapInfo:
         scans=fields.whole("scans"),
         robots=fields.texts("robots"),
         sightings=tuple(_sighting(of) for of in fields.objects("sightings")) if fields.has("sightings") else (),
+        asleep=fields.flag("asleep"),
         set_bytes=fields.whole("set_bytes"),
         moment_bytes=fields.whole("moment_bytes"),
         trajectory_bytes=fields.whole("trajectory_bytes"),
