@@ -318,7 +318,7 @@ mod tests {
             let _ = held.recv();
             Ok(None)
         }));
-        let hosted = service.map(&map).unwrap();
+        let hosted = service.map(&map).await.unwrap();
         drop(hosted.commit_queue.submit(&Requester::from(&Asker::default()), busy).unwrap());
         begun.await.unwrap();
         (service, map, hold)
@@ -360,7 +360,7 @@ mod tests {
     #[tokio::test]
     async fn where_one_asker_has_half_of_the_places_another_still_finds_one() {
         let (service, map, _hold) = with_busy_map(ServiceSettings::default()).await;
-        let hosted = service.map(&map).unwrap();
+        let hosted = service.map(&map).await.unwrap();
         let submit = |asker: &str| {
             let nothing = Submission::Undecided(Box::new(|_, _| Ok(None)));
             hosted.commit_queue.submit(&Requester::from(&Asker::with_key(asker)), nothing)

@@ -237,7 +237,7 @@ async fn an_undo_gives_way_before_each_change_that_it_reads() {
         let scan = ScanRequest { guess, at_guess, ..ScanRequest::new(robot(), points) };
         service.insert_scan(&name, scan).await.unwrap();
     }
-    let map = service.map(&name).unwrap();
+    let map = service.map(&name).await.unwrap();
     let undo = Undo { target: UndoTarget::RobotSince { robot: robot(), revision: 0 }, request_id: None };
     let (budget, turns) = (ResourceBudget::new(None, Marks::default()), Counted::default());
     let limit = TimeLimit::new("undo_time_max", 3600.0);
