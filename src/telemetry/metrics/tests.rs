@@ -4,7 +4,7 @@ use super::recorder::*;
 use mrol_map::align::Verdict;
 use mrol_map::map::Lookup;
 use mrol_map::map::{MapName, RobotName};
-use mrol_service::{Change, End, Ended, JudgedScan, Observer, Outcome};
+use mrol_service::{Change, End, Ended, JudgedScan, MapsAwake, Observer, Outcome};
 use std::time::Duration;
 
 /// A scan that was judged.
