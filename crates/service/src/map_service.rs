@@ -54,7 +54,7 @@ impl MapService {
         Ok(service)
     }
 
-    /// Opens the service before its maps are: [`MapService::open_maps`] opens them, and who asks for one meanwhile waits
+    /// Opens the service before its maps are: [`MapService::open_maps`] opens them, and a request for one meanwhile waits
     /// until it is open. Reads files: not for an async thread.
     ///
     /// # Errors
@@ -249,7 +249,7 @@ impl Drop for Submitted<'_> {
     }
 }
 
-/// Who made the map's changes is gone, by a defect.
+/// The worker of the map is gone, by a defect.
 pub(super) fn commit_thread_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
     ServiceError::new(Reason::JobPanicked, "the change failed by a defect of the server")
 }

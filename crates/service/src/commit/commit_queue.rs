@@ -34,7 +34,7 @@ pub(crate) struct CommitQueue {
     durations: Arc<SharedDurations>,
 }
 
-/// The changes that wait, and who makes them. One thread at a time has a turn.
+/// The changes that wait, and the worker that makes them. One thread at a time has a turn.
 struct Inbox {
     state: Mutex<State>,
     threads: Weak<CommitThreads>,
@@ -50,7 +50,7 @@ struct State {
     /// A turn is asked for later, to sync.
     is_alarm_set: bool,
     is_closed: bool,
-    /// A defect ended the worker: who comes now is told so.
+    /// A defect ended the worker: later changes are refused.
     is_broken: bool,
     /// Dropped when the worker is gone for good.
     at_work: Option<oneshot::Sender<()>>,

@@ -36,7 +36,7 @@ impl Turns {
         robot.of.push_back(waiting);
     }
 
-    /// The changes that are made next, in their order, before it is looked at who waits then: at most so many, and none
+    /// The changes that are made next, in their order, before others are let in: at most so many, and none
     /// behind one that has yet to be decided on, which may take long.
     pub(super) fn group(&mut self, changes_max: usize) -> Vec<Waiting> {
         let (mut group, mut voxels) = (Vec::new(), 0);

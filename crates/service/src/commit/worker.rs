@@ -1,4 +1,4 @@
-//! Who makes the changes of a map: durable, then visible, then acknowledged.
+//! The worker of a map makes its changes: durable, then visible, then acknowledged.
 
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};

@@ -9,16 +9,13 @@ use super::map_file::from_file;
 use crate::caller::AllowedMaps;
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
-use crate::maps::{HostedMap, Saving};
+use crate::maps::{HostedMap, RATE_SAMPLES, Saving};
 use crate::observer::{Change, Outcome};
 use crate::request::{MapFile, MapInfo, MapsAwake, UnavailableMap};
 use mrol_map::map::{MapName, MapSettings};
 use mrol_map::sync::polled_by_runtime;
 use mrol_map::util::StopSignal;
 use mrol_store::Opened;
-
-/// Absent neighbors of occupied voxels on which a description measures each level's false positives.
-const RATE_SAMPLES: usize = 4096;
 
 impl MapService {
     /// Makes a map; true when it was not there. The same settings again are fine.

@@ -16,7 +16,7 @@ pub(super) struct Asleep {
     pub(super) robots: Mutex<Option<Robots>>,
     /// The folders that claimed to be it at the start, where it was not opened yet.
     pub(super) folders: Option<Vec<String>>,
-    /// Held by who opens it, and by who puts it to sleep until it has left its files.
+    /// Held while it is opened, and while it falls asleep, until its files are closed.
     pub(super) opening: Arc<tokio::sync::Mutex<()>>,
 }
 

@@ -54,6 +54,8 @@ struct LastUse {
     at_ms: AtomicU64,
 }
 
+/// Absent neighbors of occupied voxels on which a description measures each level's false positives.
+pub(crate) const RATE_SAMPLES: usize = 4096;
 /// Seed of the sample on which false positives are measured: the same map gives the same figures.
 const RATE_SEED: u64 = 1;
 

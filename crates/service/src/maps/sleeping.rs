@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Whoever uses a map holds it, and gets it under the lock of the names. So a map that the names alone hold, under that
-//! lock, is used by nobody, and nobody can begin to. Its files are closed before they are opened again, since both hold
-//! what [`Asleep::opening`] keeps apart.
+//! lock, is used by nobody, and nobody can begin to. Its files are closed before they are opened again: closing and opening
+//! both hold [`Asleep::opening`].
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use super::asleep::Asleep;
 use super::catalog::{Catalog, blocking};
-use super::hosted_map::{Closed, HostedMap};
+use super::hosted_map::{Closed, HostedMap, RATE_SAMPLES};
 use super::named::Place;
 use super::opening::open_one;
 use super::saving::Saving;
@@ -27,11 +27,8 @@ use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 use mrol_store::{OpeningProgress, StoreError};
 
-/// Absent neighbors of occupied voxels on which the description of a map that falls asleep measures false positives.
-const RATE_SAMPLES: usize = 4096;
-
 impl Catalog {
-    /// The map of that name, which is opened where it sleeps: once for all who ask meanwhile, and whoever goes away.
+    /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one is given up.
     pub(crate) async fn get(self: &Arc<Self>, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
         loop {
             let place = self.look_up(name)?;
@@ -39,7 +36,7 @@ impl Catalog {
                 Place::Awake(map) => return Ok(map),
                 Place::Asleep(asleep) => asleep,
             };
-            // Who waits holds no thread.
+            // A request that waits holds no thread.
             let opening = Arc::clone(&asleep.opening).lock_owned().await;
             let turn = Arc::clone(&self.openings).acquire_owned().await;
             let (catalog, name) = (Arc::clone(self), name.name().clone());
@@ -129,7 +126,7 @@ impl Catalog {
         drop(maps);
         let Closed { robots, done } = map.close();
         *asleep.robots.lock() = Some(robots);
-        // Whoever wants to open it waits until its files are closed.
+        // It is opened again only once its files are closed.
         drop(done.blocking_recv());
         drop(leaving);
         tracing::debug!(map = %name, "asleep");

@@ -1,4 +1,4 @@
-//! Maps that sleep: who asks gets the right answer, whatever falls asleep and wakes meanwhile.
+//! Maps that sleep: answers are right, whatever falls asleep and wakes meanwhile.
 
 use std::path::Path;
 use std::time::Duration;
@@ -107,7 +107,7 @@ async fn a_map_that_is_watched_or_is_to_change_by_itself_stays_awake() {
     let asleep = |maps: Vec<crate::MapInfo>| maps.iter().map(|map| map.is_asleep).collect::<Vec<_>>();
     assert_eq!(asleep(service.list_maps().await.unwrap()), [false, false, true]);
     drop(watch);
-    // Who went away lets go of the map after a while.
+    // A caller that went away lets go of the map after a while.
     while service.put_unused_to_sleep().await == 0 {
         tokio::task::yield_now().await;
     }
@@ -215,7 +215,7 @@ async fn a_map_is_served_before_all_are_open_and_one_that_cannot_be_keeps_no_oth
     assert_eq!(service.map_info(&name(2)).await.unwrap().version.revision, 1);
     assert_eq!(service.map_info(&name(1)).await.unwrap_err().reason, Reason::MapUnavailable);
     assert_eq!(service.maps_awake(), MapsAwake { awake: 1, asleep: 1, wakes: 0 });
-    // Who lists waits until all are open.
+    // A list waits until all are open.
     let listing = tokio::spawn({
         let service = service.clone();
         async move { service.list_maps().await.unwrap().len() }

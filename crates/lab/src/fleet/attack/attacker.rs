@@ -1,4 +1,4 @@
-//! One of those who attack at once: it asks again as soon as it is answered.
+//! An attacker: it asks again as soon as it is answered.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,12 +16,12 @@ use crate::fleet::tally::Tally;
 use mrol_client::Client;
 use mrol_map::map::RobotName;
 
-/// How long who was refused waits, so that the attackers' own machine has time for the answers.
+/// How long an attacker waits that was refused, so that the attackers' own machine has time for the answers.
 const AFTER_REFUSAL: Duration = Duration::from_millis(50);
 /// Names of the robots of tiny scans: as many as a map has at most, less one.
 const TINY_ROBOTS: usize = 4095;
 
-/// One who attacks in one way.
+/// An attacker, and its one kind of attack.
 pub(super) struct Attacker {
     pub(super) attack: Attack,
     /// Among those who attack in the same way.

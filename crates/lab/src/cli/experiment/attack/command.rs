@@ -33,7 +33,7 @@ the map described 5 times a second and takes a snapshot a minute, and health che
 its own. First they are alone. Then others join, with a key that may read and one that may insert, in a process of the
 lowest priority, each asking again as soon as it is answered.
 
-Times are the clients': from the moment when a request was due to its answer. Who waits longer than a period goes on with
+Times are the clients': from the moment when a request was due to its answer. A caller that waits longer than a period goes on with
 the newest request that is due: the others count as left out. So the times count what the machine itself keeps waiting;
 give it nothing else to do meanwhile. The exit code says whether the goals were met.";
 
