@@ -341,9 +341,10 @@ mod tests {
             revisions
                 .spawn(async move { (key, service.insert_scan(&map, scan).await.unwrap().version.revision) });
         };
+        let hosted = service.map(&map).await.unwrap();
+        let busy = hosted.commit_queue.places.taken();
         let all_wait = async |scans: u64| {
-            let at_rest = || service.lanes().into_iter().find(|lane| lane.name == "mapping").unwrap();
-            while at_rest().begun < scans || at_rest().running > 0 {
+            while hosted.commit_queue.places.taken() < busy + scans as usize {
                 tokio::task::yield_now().await;
             }
         };
