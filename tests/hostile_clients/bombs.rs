@@ -50,14 +50,14 @@ async fn bombard(siege: &Siege, path: &'static str, encoding: &'static str, bomb
 
 #[tokio::test]
 async fn gzip_messages_that_grow_beyond_the_limit() {
-    let siege = Siege::begin("gzip bombs over gRPC").await;
+    let siege = Siege::begin_alone("gzip bombs over gRPC").await;
     bombard(&siege, QUERY, "gzip", gzip(MESSAGE_BYTES_MAX + 16 * MIB)).await;
     siege.end().await;
 }
 
 #[tokio::test]
 async fn zstd_messages_that_grow_beyond_the_limit() {
-    let siege = Siege::begin("zstd bombs over gRPC").await;
+    let siege = Siege::begin_alone("zstd bombs over gRPC").await;
     bombard(&siege, QUERY, "zstd", zstd(1024 * MIB)).await;
     siege.end().await;
 }
@@ -89,7 +89,7 @@ fn varint(mut length: usize) -> Vec<u8> {
 
 #[tokio::test]
 async fn compressed_bodies_over_http_are_refused() {
-    let siege = Siege::begin("bombs over HTTP").await;
+    let siege = Siege::begin_alone("bombs over HTTP").await;
     for (encoding, bomb) in [("gzip", gzip(64 * MIB)), ("zstd", zstd(64 * MIB))] {
         for _ in 0..100 {
             let url = format!("http://{}/v1/maps/hall/occupancy", siege.http());

@@ -43,7 +43,7 @@ fn stream(round: u32, i: usize) -> u32 {
 
 #[tokio::test]
 async fn rapid_reset() {
-    let siege = Siege::begin("rapid reset").await;
+    let siege = Siege::begin_alone("rapid reset").await;
     let reset = |round| {
         let calls = (0..AT_ONCE).map(|i| stream(round, i));
         calls.flat_map(|s| [call(s, QUERY, &[], 0), frame(RST_STREAM, 0, s, &CANCEL)].concat()).collect()
@@ -54,7 +54,7 @@ async fn rapid_reset() {
 
 #[tokio::test]
 async fn calls_that_reset_themselves_by_an_error() {
-    let siege = Siege::begin("resets by errors").await;
+    let siege = Siege::begin_alone("resets by errors").await;
     // A window that grows by nothing is an error of its stream.
     let reset = |round| {
         let calls = (0..AT_ONCE).map(|i| stream(round, i));
@@ -66,7 +66,7 @@ async fn calls_that_reset_themselves_by_an_error() {
 
 #[tokio::test]
 async fn continuation_flood() {
-    let siege = Siege::begin("continuation flood").await;
+    let siege = Siege::begin_alone("continuation flood").await;
     let begun = frame(HEADERS, 0, 1, &call_headers(QUERY, &[]));
     let more = |_| {
         let piece = crate::frames::literal("x-more", &"a".repeat(1000));
@@ -86,7 +86,7 @@ async fn frames_that_ask_for_nothing() {
         ("empty continuations", CONTINUATION, 1, Vec::new()),
         ("empty data", DATA, 1, Vec::new()),
     ] {
-        let siege = Siege::begin(name).await;
+        let siege = Siege::begin_alone(name).await;
         let begun = match kind {
             CONTINUATION => frame(HEADERS, 0, 1, &call_headers(QUERY, &[])),
             DATA => call(1, QUERY, &[], 0),

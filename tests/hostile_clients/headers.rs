@@ -11,7 +11,7 @@ const TIMES: usize = 50;
 
 #[tokio::test]
 async fn giant_headers_over_http() {
-    let siege = Siege::begin("giant headers over HTTP/1").await;
+    let siege = Siege::begin_alone("giant headers over HTTP/1").await;
     let long = format!("x-long: {}\r\n", "a".repeat(4 << 20));
     let mut many = String::new();
     for i in 0..100_000 {
@@ -32,7 +32,7 @@ async fn giant_headers_over_http() {
 
 #[tokio::test]
 async fn giant_headers_over_http2() {
-    let siege = Siege::begin("giant headers over HTTP/2").await;
+    let siege = Siege::begin_alone("giant headers over HTTP/2").await;
     let piece = literal("x-long", &"a".repeat(16_000));
     for server in [siege.grpc(), siege.http()].into_iter().cycle().take(TIMES) {
         let mut connection = Connection::open(server).await;
@@ -48,7 +48,7 @@ async fn giant_headers_over_http2() {
 
 #[tokio::test]
 async fn headers_that_name_one_in_the_table_again_and_again() {
-    let siege = Siege::begin("HPACK bombs").await;
+    let siege = Siege::begin_alone("HPACK bombs").await;
     // Kept in the table, where it is the newest: a byte stands for all of it.
     let kept = [&[0x40][..], &text("x-bomb"), &text(&"a".repeat(3900))].concat();
     let newest = 0x80 | 62;

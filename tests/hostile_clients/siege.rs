@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use mrol::wire::transport::STREAM_WINDOW_BYTES;
 use tempfile::TempDir;
-use tokio::sync::{Mutex, MutexGuard};
+use tokio::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use crate::honest::Honest;
 use crate::probe::Probe;
@@ -39,8 +39,15 @@ const INFLATING_MAX: usize = 2;
 /// How long an attack goes on that does not end by itself.
 pub(crate) const ATTACK: Duration = Duration::from_secs(2);
 
-/// One attack after another: each is measured by itself.
-static GROUND: Mutex<()> = Mutex::const_new(());
+/// Attacks that want whole cores go on alone; those that hold things and wait, beside each other.
+static GROUND: RwLock<()> = RwLock::const_new(());
+
+/// Where an attack goes on.
+#[expect(dead_code, reason = "held until the attack is over")]
+enum Ground {
+    Shared(RwLockReadGuard<'static, ()>),
+    Alone(RwLockWriteGuard<'static, ()>),
+}
 
 /// A daemon in a process of its own, honest clients and a prober beside it.
 pub(crate) struct Siege {
@@ -50,7 +57,7 @@ pub(crate) struct Siege {
     honest: Honest,
     bound: usize,
     _data: TempDir,
-    _ground: MutexGuard<'static, ()>,
+    _ground: Ground,
 }
 
 impl Siege {
@@ -59,9 +66,19 @@ impl Siege {
         Self::begin_within(name, "", under_attack()).await
     }
 
+    /// [`Siege::begin`] for an attack that wants whole cores.
+    pub(crate) async fn begin_alone(name: &'static str) -> Self {
+        let ground = Ground::Alone(GROUND.write().await);
+        Self::begin_on(ground, name, "", under_attack()).await
+    }
+
     /// [`Siege::begin`] with more limits, for an attack that may take no more than `bytes` of memory.
     pub(crate) async fn begin_within(name: &'static str, limits: &str, bytes: usize) -> Self {
-        let ground = GROUND.lock().await;
+        let ground = Ground::Shared(GROUND.read().await);
+        Self::begin_on(ground, name, limits, bytes).await
+    }
+
+    async fn begin_on(ground: Ground, name: &'static str, limits: &str, bytes: usize) -> Self {
         let data = tempfile::tempdir().unwrap();
         let settings = data.path().join("mrol.toml");
         std::fs::write(&settings, self::settings() + limits).unwrap();

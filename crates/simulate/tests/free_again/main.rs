@@ -1,6 +1,7 @@
 //! What is taken away is free again within three scans, for a robot that stands; and thin things that stand are kept.
 //!
-//! Prints the figures of docs/measurements.md ("Free again"). With `MROL_PEER_DIR` the scans are written there for OctoMap, and what it
+//! Three seeds of each scene; with `MROL_FREE_AGAIN_SEEDS=6` and `--nocapture` it prints the figures of docs/measurements.md ("Free
+//! again"). With `MROL_PEER_DIR` the scans are written there for OctoMap, and what it
 //! made of them is read from there.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
@@ -15,7 +16,10 @@ use mrol_map::voxel::VoxelKey;
 use robot::Robot;
 use scenes::{BEFORE, Kind, Situation};
 
-const SEEDS: std::ops::Range<u64> = 1..7;
+fn seeds() -> std::ops::RangeInclusive<u64> {
+    1..=std::env::var("MROL_FREE_AGAIN_SEEDS").map_or(3, |seeds| seeds.parse().unwrap())
+}
+
 /// Of the place of what went, so much has to be free after three scans, and so many of its voxels may be left, percent. Carving leaves
 /// some beside rims, and next to the floor.
 const FREE_LEAST: usize = 85;
@@ -89,7 +93,7 @@ fn run(kind: Kind, seed: u64) -> (Figures, [usize; 2]) {
 }
 
 fn figures(kind: Kind) -> Vec<Figures> {
-    SEEDS
+    seeds()
         .map(|seed| {
             let (figures, [peer_free, peer_occupied]) = run(kind, seed);
             println!("{kind:?} {seed}: {figures:?}; the peer: {peer_free} free, {peer_occupied} occupied");

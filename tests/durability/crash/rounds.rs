@@ -3,13 +3,7 @@
 //! plain model. Beside them a second map is deleted, made again and restored under its name all the time, on a disk that
 //! fails at times while it is made.
 //!
-//! Twenty rounds; `MROL_CRASH_ROUNDS=200 cargo test --test crash -- --nocapture` is the long form.
-
-#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
-
-mod remaker;
-#[path = "../support/mod.rs"]
-mod support;
+//! Twenty rounds; `MROL_CRASH_ROUNDS=200 cargo test --test durability crash -- --nocapture` is the long form.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -25,17 +19,17 @@ use mrol::service::{Deletion, DeletionTarget, ListingRequest, ScanRequest, Undo,
 use mrol::voxel::{Lattice, VoxelKey};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use remaker::Remaker;
 use tokio::sync::watch;
 
+use super::remaker::{self, Remaker};
 use crate::support::disk::Disk;
 use crate::support::map_folders::folder_of;
 use crate::support::process::Process;
 use crate::support::skipped::skipped_in_part;
 
 const WRITERS: usize = 4;
-const RESOLUTION_M: f64 = 0.1;
-const LEVELS: u32 = 4;
+pub(super) const RESOLUTION_M: f64 = 0.1;
+pub(super) const LEVELS: u32 = 4;
 /// Snapshots are written all the time, beside the writers.
 const SYNCED: [&str; 2] = ["--snapshot-journal-mib", "1"];
 /// The end of a process takes nothing that was written, synced or not.

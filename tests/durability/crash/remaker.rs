@@ -17,8 +17,8 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::rounds::{LEVELS, RESOLUTION_M};
 use crate::support::disk::Disk;
-use crate::{LEVELS, RESOLUTION_M};
 
 /// An incarnation that has seen so many scans is deleted, at the latest.
 const SCANS_MAX: u64 = 16;

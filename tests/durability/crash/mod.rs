@@ -1,0 +1,4 @@
+//! `kill -9` at random moments, round after round.
+
+mod remaker;
+mod rounds;
