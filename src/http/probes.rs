@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -15,6 +15,7 @@ use super::operations::UnavailableResponse;
 use crate::access::Authorized;
 use crate::telemetry::Metrics;
 use mrol_service::MapService;
+use mrol_store::Opened;
 
 /// Whether requests are taken.
 #[derive(Debug, Default, Serialize, ToSchema)]
@@ -55,6 +56,16 @@ pub(super) struct OpeningResponse {
     pub(super) bytes_read: u64,
 }
 
+impl ReadyResponse {
+    /// 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
+    pub(super) fn starting(opened: Opened) -> Response {
+        let Opened { bytes, bytes_read, maps, maps_open } = opened;
+        let opening = Some(OpeningResponse { maps, maps_open, bytes, bytes_read });
+        let body = Self { reason: Some("starting"), opening, ..Self::default() };
+        (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], Json(body)).into_response()
+    }
+}
+
 /// Tells that the process lives.
 #[utoipa::path(
     get,
@@ -65,9 +76,9 @@ pub(super) async fn live(NoParams: NoParams) -> &'static str {
     "ok"
 }
 
-/// Tells whether requests are taken.
+/// Tells whether all maps are open and requests are taken.
 ///
-/// Maps that take no changes since their journal failed are named to whoever may name them; they answer
+/// While maps are being opened, those that are open are served: a request for another one waits for it. Maps that take no changes since their journal failed are named to whoever may name them; they answer
 /// queries all the same. So are maps that could not be opened, with what helps: the others are served. A
 /// server whose disk or memory is nearly full stays ready.
 #[utoipa::path(
@@ -86,10 +97,12 @@ pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
     NoParams: NoParams,
-) -> (StatusCode, Json<ReadyResponse>) {
+) -> Response {
     if adapter.admission.lifecycle().is_leaving() {
         let body = ReadyResponse { reason: Some("draining"), ..ReadyResponse::default() };
-        (StatusCode::SERVICE_UNAVAILABLE, Json(body))
+        (StatusCode::SERVICE_UNAVAILABLE, Json(body)).into_response()
+    } else if let Some(opened) = service.opening() {
+        ReadyResponse::starting(opened)
     } else {
         let read_only = service.read_only_maps().into_iter();
         let body = ReadyResponse {
@@ -99,7 +112,7 @@ pub(super) async fn ready(
             writes_refused: service.shortages().iter().map(|shortage| shortage.reason().as_str()).collect(),
             ..ReadyResponse::default()
         };
-        (StatusCode::OK, Json(body))
+        (StatusCode::OK, Json(body)).into_response()
     }
 }
 
@@ -128,7 +141,7 @@ pub(super) async fn metrics(
 }
 
 async fn scrape(metrics: &Metrics, service: &MapService) -> String {
-    let maps = service.list_maps().await.unwrap_or_else(|error| {
+    let maps = service.list_open_maps().await.unwrap_or_else(|error| {
         // The counters say most when the server is overloaded, so they are told without the maps.
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()

@@ -1,26 +1,23 @@
-//! What is answered while the maps are being opened: that the process lives, and how far that has come. The viewer's page is
+//! What is answered while the maps are being found: that the process lives, and how far that has come. The viewer's page is
 //! there too, and says the same.
 
-use std::sync::Arc;
-
+use axum::Router;
 use axum::extract::{Request, State};
-use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use axum::{Json, Router};
 
 use super::error::HttpError;
 use super::forms::NoParams;
 use super::probes;
-use super::probes::{OpeningResponse, ReadyResponse};
+use super::probes::ReadyResponse;
 use super::viewer;
 use crate::access::Access;
 use mrol_service::{Reason, ServiceError};
-use mrol_store::{Opened, OpeningProgress};
+use mrol_store::OpeningProgress;
 
 /// The routes of a server that is starting.
-pub fn starting(progress: Arc<OpeningProgress>, access: Access) -> Router {
+pub fn starting(progress: OpeningProgress, access: Access) -> Router {
     Router::new()
         .route("/livez", get(probes::live))
         .route("/readyz", get(ready))
@@ -39,12 +36,9 @@ async fn named(State(access): State<Access>, request: Request, next: Next) -> Re
     }
 }
 
-/// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
-async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParams: NoParams) -> Response {
-    let Opened { bytes, bytes_read, maps, maps_open } = progress.opened();
-    let opening = Some(OpeningResponse { maps, maps_open, bytes, bytes_read });
-    let body = ReadyResponse { reason: Some("starting"), opening, ..ReadyResponse::default() };
-    (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], Json(body)).into_response()
+/// `GET /readyz`: 503, as while maps are being opened.
+async fn ready(State(progress): State<OpeningProgress>, NoParams: NoParams) -> Response {
+    ReadyResponse::starting(progress.opened())
 }
 
 async fn refuse() -> HttpError {

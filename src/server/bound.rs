@@ -15,6 +15,7 @@ use super::background::keep_house;
 use super::endpoint::Endpoint;
 use super::files::Warnings;
 use super::listener::{Accepting, TcpSocket};
+use super::opening::{Opening, panicked};
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::starting::{CLOSING_MAX, Starting};
@@ -50,11 +51,12 @@ pub struct Server {
     grpc: TcpSocket,
     http_socket: Option<UnixSocket>,
     grpc_socket: Option<UnixSocket>,
+    progress: OpeningProgress,
 }
 
 impl Server {
-    /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come. Unix sockets
-    /// are made when that is done. Dropped before, it stops opening maps.
+    /// Binds both addresses and finds the maps, which [`Server::run`] opens. Maps in files of old are taken in first: meanwhile
+    /// HTTP says at `/readyz` how far that has come. Unix sockets are made when that is done. Dropped before, it stops.
     ///
     /// # Errors
     /// When the data folder, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
@@ -77,16 +79,19 @@ impl Server {
         let observers: Vec<Arc<dyn Observer>> = vec![Arc::new(metrics.clone()), Arc::new(audit.clone())];
         let settings = ServiceSettings { gauges: Some(gauges), observers, ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
-        let progress = Arc::new(OpeningProgress::default());
+        let progress = OpeningProgress::default();
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
-        let routes = http::starting(Arc::clone(&progress), access.clone());
+        let routes = http::starting(progress.clone(), access.clone());
         let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
-        let _until_open = CancelOpening(Arc::clone(&progress));
-        let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
+        let until_found = CancelOpening(Some(progress.clone()));
+        let begin = {
+            let progress = progress.clone();
+            move || MapService::begin(settings, &progress)
+        };
+        let begun = tokio::task::spawn_blocking(begin).await;
         starting.end().await;
-        let service = opened
-            .map_err(|panic| ServerError::Stopped("opening the maps", panic.to_string()))?
-            .map_err(ServerError::Open)?;
+        let service = begun.map_err(|panic| panicked(&panic))?.map_err(ServerError::Open)?;
+        until_found.passed();
         Ok(Self {
             service,
             recorder: RequestRecorder::new(metrics, audit),
@@ -97,6 +102,7 @@ impl Server {
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
             http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
+            progress,
             config,
         })
     }
@@ -143,7 +149,7 @@ impl Server {
         waited.saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
     }
 
-    /// Serves until `shutdown`, then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
+    /// Opens the maps, and serves each as soon as it is open, until `shutdown`; then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
     /// `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
     /// saved.
     ///
@@ -151,11 +157,11 @@ impl Server {
     /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.
     ///
     /// # Errors
-    /// When a listener stops by itself, or the maps cannot be saved at the end, or not in time: a disk may hang. A thread
+    /// When a listener stops by itself, the maps cannot be opened, or the maps cannot be saved at the end, or not in time: a disk may hang. A thread
     /// of the runtime is then in its hands, so that the runtime has to be left behind
     /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, access, tls, service, recorder, lifecycle, .. } = &self;
+        let Self { config, access, tls, service, recorder, lifecycle, progress, .. } = &self;
         let metrics = recorder.metrics().clone();
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
@@ -178,19 +184,20 @@ impl Server {
                 return Ok(());
             }
         }
+        let mut opening = Opening::begin(service.clone(), progress.clone(), health).await;
         let mut accepting = self.accept(&grpc, &http);
         let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
         let looking = tokio::spawn(files.look_after(lifecycle.clone()));
         let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
-        health.set_serving().await;
 
         let ended = tokio::select! {
             () = &mut shutdown => Ok(()),
             stopped = accepting.join_next() => stopped.map_or(Ok(()), |end| Err(stopped_by_itself(end))),
+            error = opening.failed() => Err(error),
         };
 
-        health.set_not_serving().await;
         lifecycle.leave();
+        opening.end().await;
         if ended.is_ok() && config.drain_delay_s > 0 {
             tracing::info!(
                 drain_delay_s = config.drain_delay_s,
@@ -241,12 +248,21 @@ impl Server {
     }
 }
 
-/// Ends the opening of maps that nobody waits for any more.
-struct CancelOpening(Arc<OpeningProgress>);
+/// Ends the search for maps where nobody waits for it any more.
+struct CancelOpening(Option<OpeningProgress>);
+
+impl CancelOpening {
+    /// The maps were found.
+    fn passed(mut self) {
+        self.0 = None;
+    }
+}
 
 impl Drop for CancelOpening {
     fn drop(&mut self) {
-        self.0.cancel();
+        if let Some(progress) = &self.0 {
+            progress.cancel();
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod expiry;
 mod files;
 mod handshakes;
 mod listener;
+mod opening;
 mod protocol;
 mod rlimit;
 mod signal;

@@ -1,4 +1,4 @@
-//! HTTP while the maps are being opened: the same socket, and answers of its own.
+//! HTTP while the maps are being found, and those in files of old taken in: the same socket, and answers of its own.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,7 +17,7 @@ use mrol_service::Limits;
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 pub(super) const CLOSING_MAX: Duration = Duration::from_secs(1);
 
-/// Answers until the maps are open.
+/// Answers until the maps are found.
 pub(super) struct Starting {
     endpoint: Endpoint,
     accepting: JoinHandle<()>,

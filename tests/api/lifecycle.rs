@@ -1,8 +1,7 @@
 //! Start, health, metrics, going down and coming back.
 
 use std::fs::{self, File};
-use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use mrol::config::Config;
@@ -19,7 +18,7 @@ use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, HealthCheckResponse};
 
 use crate::support::daemon::{
-    Daemon, PATIENCE, bytes_of, client, identity_json, json_of, pose_json, query_pb, row, scan_pb,
+    Daemon, PATIENCE, bytes_of, client, identity_json, json_of, pose_json, query_pb, row, scan_pb, wait_until,
 };
 use crate::support::map_folders::folder_of;
 use crate::support::process::Process;
@@ -40,14 +39,6 @@ fn large_scan(points: usize) -> Vec<[f32; 3]> {
 
 /// Requests that were read and are not answered yet.
 const IN_WORK: &str = r#"mrol_requests_in_flight{state="in_work"}"#;
-
-async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
-    let start = Instant::now();
-    while !happened().await {
-        assert!(start.elapsed() < PATIENCE, "it never happened");
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn idle_streams_and_half_open_connections_do_not_keep_it_from_going_down() {
@@ -361,75 +352,6 @@ fn with_few_open_files_it_keeps_fewer_connections_and_says_so() {
     for part in ["fewer open files", "open_files=512", &needed, "connections_max=128"] {
         assert!(said.contains(part), "{part} is not in {said}");
     }
-}
-
-/// A pipe that nobody writes to or reads from: who opens it waits for ever, as on a disk that hangs.
-fn make_hang(path: &Path) {
-    assert!(Command::new("mkfifo").arg(path).status().expect("mkfifo").success());
-}
-
-/// The exit code of a process that must end by itself.
-async fn code_at_end(server: Process) -> Option<i32> {
-    let ended = tokio::time::timeout(PATIENCE, tokio::task::spawn_blocking(|| server.ended())).await;
-    ended.expect("its end").expect("no panic")
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn told_to_end_while_a_disk_that_hangs_is_read_it_ends() {
-    let data = tempfile::tempdir().unwrap();
-    fs::create_dir(data.path().join("maps")).unwrap();
-    make_hang(&data.path().join("maps/attic.mrol"));
-    let log = data.path().join("log");
-    let mut serve = Command::new(env!("CARGO_BIN_EXE_mrol"));
-    serve.args(["serve", "--data-dir", data.path().to_str().unwrap()]);
-    serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"]);
-    let mut server = serve.stdout(Stdio::null()).stderr(File::create(&log).unwrap()).spawn().unwrap();
-    let said = || fs::read_to_string(&log).unwrap();
-    wait_until(async || said().contains("opening the maps")).await;
-    let tell = Command::new("kill").args(["-s", "TERM", &server.id().to_string()]).status();
-    assert!(tell.unwrap().success());
-    let start = Instant::now();
-    let code = loop {
-        match server.try_wait().unwrap() {
-            Some(status) => break status.code(),
-            None if start.elapsed() > PATIENCE => {
-                server.kill().unwrap();
-                panic!("it opens maps still: {}", said());
-            }
-            None => tokio::time::sleep(Duration::from_millis(10)).await,
-        }
-    };
-    assert_eq!(code, Some(0), "{}", said());
-    assert!(said().contains("told to end while the maps are being opened"), "{}", said());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn with_a_disk_that_hangs_at_the_end_it_ends_within_its_bound() {
-    let data = tempfile::tempdir().unwrap();
-    let log = data.path().join("log");
-    let server = Process::start_with_log(
-        data.path().to_str().unwrap(),
-        &["--drain-seconds", "1"],
-        "warn",
-        File::create(&log).unwrap().into(),
-    );
-    let map = format!("{}/v1/maps/a", server.http);
-    client().put(&map).json(&json!({"resolution_m": 0.1})).send().await.unwrap();
-    let scan = json!({"robot": "r", "points": row(9), "guess": identity_json(), "align": false});
-    let put = client().post(format!("{map}/scans")).json(&scan).send().await.unwrap();
-    assert_eq!(put.status(), StatusCode::OK);
-    let folder = fs::read_dir(data.path().join("maps")).unwrap().next().unwrap().unwrap().path();
-    make_hang(&folder.join(".unfinished-snapshot-00000000000000000001.mrol"));
-    server.signal("TERM");
-    assert_ne!(code_at_end(server).await, Some(0));
-    let said = fs::read_to_string(&log).unwrap();
-    assert!(said.contains("saving the maps took longer than"), "{said}");
-
-    // What was acknowledged is there without the snapshot.
-    let server = Process::start(data.path().to_str().unwrap(), &[]);
-    let described = client().get(format!("{}/v1/maps/a", server.http)).send().await.unwrap();
-    assert_eq!(json_of(described).await["revision"], 1);
-    assert_eq!(server.stop(), Some(0));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -10,6 +10,7 @@ mod description;
 mod deskewing;
 mod events;
 mod grpc;
+mod hanging_disk;
 mod http;
 mod keep_outs;
 mod lifecycle;

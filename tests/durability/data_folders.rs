@@ -1,7 +1,6 @@
 //! What is kept, what it looks like when it cannot be, and data folders of former releases.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use mrol::http;
 use mrol::map::{MapContents, MapSettings, REVISION_MAX};
@@ -128,7 +127,7 @@ async fn the_same_deletion_sent_many_times_at_once_is_done_once() {
 async fn a_server_that_is_starting_says_how_far_it_is() {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
-    let progress = Arc::new(OpeningProgress::default());
+    let progress = OpeningProgress::default();
     tokio::spawn(async move {
         axum::serve(listener, http::starting(progress, mrol::access::Access::open())).await
     });

@@ -1,6 +1,6 @@
 //! Every limit on what is let in refuses by its name, and what is refused keeps nobody else out.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use mrol::config::Config;
 use mrol::wire::pb;
@@ -14,7 +14,7 @@ use tonic::Code;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_client::HealthClient;
 
-use crate::support::daemon::{Daemon, PATIENCE, bytes_of, client, json_of, query_pb, row};
+use crate::support::daemon::{Daemon, PATIENCE, bytes_of, client, json_of, query_pb, row, wait_until};
 
 const MIB: usize = 1 << 20;
 
@@ -48,14 +48,6 @@ async fn assert_probes_answer(daemon: &Daemon) {
     }
     let mut health = HealthClient::new(daemon.channel().await);
     assert_eq!(health.check(HealthCheckRequest::default()).await.expect("health").into_inner().status, 1);
-}
-
-async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
-    let start = Instant::now();
-    while !happened().await {
-        assert!(start.elapsed() < PATIENCE, "it never happened");
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
 }
 
 /// A request over HTTP/1 of which the head and some of the body is sent.

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mrol::config::Config;
 use mrol::server::{Server, ServerError};
@@ -22,6 +22,15 @@ use super::description::as_described;
 
 /// How long anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Waits until it happened.
+pub async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
+    let start = Instant::now();
+    while !happened().await {
+        assert!(start.elapsed() < PATIENCE, "it never happened");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
 
 /// A running server.
 pub struct Daemon {
@@ -46,7 +55,7 @@ impl Daemon {
     /// With the maps in `data`.
     pub async fn start_in(data: TempDir, change: impl FnOnce(&mut Config)) -> Self {
         let server = Server::bind(config(&data, change)).await.expect("a server");
-        Self::serve(server, data)
+        Self::serve(server, data).await
     }
 
     /// With other gauges of disk and memory than the system's.
@@ -61,14 +70,21 @@ impl Daemon {
         change: impl FnOnce(&mut Config),
     ) -> Self {
         let server = Server::bind_with(config(&data, change), gauges).await.expect("a server");
-        Self::serve(server, data)
+        Self::serve(server, data).await
     }
 
-    fn serve(server: Server, data: TempDir) -> Self {
+    /// Serves; where there are maps, once they are open.
+    async fn serve(server: Server, data: TempDir) -> Self {
         let (http, grpc) = (server.http_address(), server.grpc_address());
+        let maps = std::fs::read_dir(data.path().join("maps"));
+        let has_maps = maps.is_ok_and(|mut maps| maps.next().is_some()) && !server.is_secured();
         let (stop, stopped) = oneshot::channel();
         let running = tokio::spawn(server.run(async move { drop(stopped.await) }));
-        Self { http, grpc, data, stop, running }
+        let daemon = Self { http, grpc, data, stop, running };
+        if has_maps {
+            wait_until(async || daemon.get("/readyz").await.status() == StatusCode::OK).await;
+        }
+        daemon
     }
 
     /// Begins to go down.

@@ -199,7 +199,7 @@ reasons! {
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";
         OutcomeUnknown "outcome_unknown" Both: "the journal failed while this change was written: it may be there after the restart", "send the same `scan_id` or `request_id` again then";
         ReplicaStale "replica_stale" Client: "the replica heard its server longer ago than `age_max` allows", "ask the server, or wait until the replica is connected";
-        Starting "starting" Http: "maps are being opened", "wait; `/readyz` tells how far it is";
+        Starting "starting" Http: "maps are being looked for", "wait; `/readyz` tells how far it is";
     }
     Internal {
         JobPanicked "job_panicked" Both: "a defect: a job of the server panicked", "report it, with the log";

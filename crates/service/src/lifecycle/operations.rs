@@ -9,7 +9,7 @@ use super::map_file::from_file;
 use crate::caller::AllowedMaps;
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
-use crate::maps::{HostedMap, RATE_SAMPLES, Saving};
+use crate::maps::{HostedMap, RATE_SAMPLES, Saving, maps_at_once};
 use crate::observer::{Change, Outcome};
 use crate::request::{MapFile, MapInfo, MapsAwake, UnavailableMap};
 use mrol_map::map::{MapName, MapSettings};
@@ -73,23 +73,34 @@ impl MapService {
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let work = async {
             self.inner.catalog.all_open().await;
-            // Those that sleep are not woken.
-            let (maps, mut asleep) = self.inner.catalog.listed_within(&self.allowed_maps);
-            let describe = move |stop: StopSignal<'_>| {
-                let described = maps.iter().map(|map| {
-                    stop.give_way();
-                    map.describe(RATE_SAMPLES, stop)
-                });
-                described.collect()
-            };
-            let described: Result<Vec<MapInfo>, _> =
-                self.inner.lanes.reads.run(&self.asker, describe).await?;
-            let mut all = described?;
-            all.append(&mut asleep);
-            all.sort_unstable_by(|a, b| a.name.cmp(&b.name));
-            Ok(all)
+            self.describe_all().await
         };
         self.observed("ListMaps", None, work, |_| Outcome::Read).await
+    }
+
+    /// As [`MapService::list_maps`], of the maps that are open by now.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn list_open_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
+        self.observed("ListMaps", None, self.describe_all(), |_| Outcome::Read).await
+    }
+
+    async fn describe_all(&self) -> Result<Vec<MapInfo>, ServiceError> {
+        // Those that sleep are not woken.
+        let (maps, mut asleep) = self.inner.catalog.listed_within(&self.allowed_maps);
+        let describe = move |stop: StopSignal<'_>| {
+            let described = maps.iter().map(|map| {
+                stop.give_way();
+                map.describe(RATE_SAMPLES, stop)
+            });
+            described.collect()
+        };
+        let described: Result<Vec<MapInfo>, _> = self.inner.lanes.reads.run(&self.asker, describe).await?;
+        let mut all = described?;
+        all.append(&mut asleep);
+        all.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+        Ok(all)
     }
 
     /// The names of the maps that the caller may name.
@@ -221,7 +232,8 @@ impl MapService {
     /// # Errors
     /// `Internal` when a file cannot be written; the others are written all the same.
     pub async fn save(&self) -> Result<usize, ServiceError> {
-        self.save_maps(Saving::Changed).await
+        // Nobody else wants the cores, and the time is short.
+        self.save_maps(Saving::Changed, maps_at_once()).await
     }
 
     /// Writes snapshots of the maps with much journal or an old snapshot; to be called every now and then.
@@ -232,16 +244,16 @@ impl MapService {
         let inner = Arc::clone(&self.inner);
         let is_scarce = inner.budget.is_disk_scarce();
         let make_room = move |map: &HostedMap| map.make_room(&inner.budget).map(|()| false);
-        let made_room = self.inner.catalog.save(|_| is_scarce, make_room).await;
+        let made_room = self.inner.catalog.save(1, |_| is_scarce, make_room).await;
         // The others are saved all the same: their journals grow just where there is no room.
-        let saved = self.save_maps(Saving::Due).await;
+        let saved = self.save_maps(Saving::Due, 1).await;
         made_room.and(saved)
     }
 
-    async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
+    async fn save_maps(&self, which: Saving, at_once: usize) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
         let needs = move |map: &HostedMap| map.needs_saving(which);
-        self.inner.catalog.save(needs, move |map| map.save(which, &inner.budget)).await
+        self.inner.catalog.save(at_once, needs, move |map| map.save(which, &inner.budget)).await
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

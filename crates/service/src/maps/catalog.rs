@@ -6,12 +6,13 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use tokio::sync::{Semaphore, watch};
+use tokio::task::JoinSet;
 use uuid::Uuid;
 
 use super::built_map::BuiltMap;
 use super::hosted_map::HostedMap;
 use super::named::{Named, Place};
-use super::opening::{find_all, not_stored, openings_at_once};
+use super::opening::{find_all, maps_at_once, not_stored};
 use crate::caller::{AllowedMaps, Reachable};
 use crate::commit::CommitThreads;
 use crate::error::{ErrorCode, Reason, ServiceError};
@@ -50,14 +51,15 @@ impl Catalog {
         let open = |path: &Path| DataDir::open(path, settings.clone());
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
         let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
+        let maps = maps.unwrap_or_default();
         Ok(Self {
-            maps: RwLock::new(Rank::Brief, maps.unwrap_or_default()),
+            are_open: watch::Sender::new(maps.asleep.is_empty()),
+            maps: RwLock::new(Rank::Brief, maps),
             data_dir: data_dir.map(Arc::new),
             settings: settings.clone(),
             commit_threads: CommitThreads::start()?,
-            openings: Arc::new(Semaphore::new(openings_at_once())),
+            openings: Arc::new(Semaphore::new(maps_at_once())),
             wakes: AtomicU64::new(0),
-            are_open: watch::Sender::new(false),
             writing: Default::default(),
         })
     }
@@ -268,20 +270,30 @@ impl Catalog {
         })
     }
 
-    /// Writes a snapshot of each map that `needs` one by `save`, which says whether it did; the number of those that it
-    /// wrote. One that cannot be written keeps none of the others from it. Of thousands of maps few need one, and no thread
-    /// is asked to look at the others.
+    /// Does `save` for each map that `needs` it, `at_once` of them side by side; the number of those for which it says that it wrote
+    /// a snapshot. One that cannot be written keeps none of the others from it. Of thousands of maps few need one, and no thread is
+    /// asked to look at the others.
     pub(crate) async fn save(
         &self,
+        at_once: usize,
         needs: impl Fn(&HostedMap) -> bool,
         save: impl Fn(&HostedMap) -> Result<bool, StoreError> + Clone + Send + 'static,
     ) -> Result<usize, ServiceError> {
-        let (mut saved, mut failed) = (0, None);
-        for map in self.all().into_iter().filter(|map| needs(map)) {
-            let save = save.clone();
-            match self.on_disk(move |_| save(&map)).await {
-                Ok(written) => saved += usize::from(written.unwrap_or(false)),
-                Err(error) => failed = Some(error),
+        let (mut saved, mut failed, mut saving) = (0, None, JoinSet::new());
+        let maps = if self.data_dir.is_some() { self.all() } else { Vec::new() };
+        let mut rest = maps.into_iter().filter(|map| needs(map));
+        loop {
+            for map in rest.by_ref().take(at_once - saving.len()) {
+                let save = save.clone();
+                saving.spawn_blocking(move || save(&map));
+            }
+            match saving.join_next().await {
+                None => break,
+                Some(Ok(Ok(is_written))) => saved += usize::from(is_written),
+                Some(Ok(Err(error))) => failed = Some(not_stored(error)),
+                Some(Err(panic)) => {
+                    failed = Some(ServiceError::new(Reason::JobPanicked, panic.to_string()));
+                }
             }
         }
         failed.map_or(Ok(saved), Err)

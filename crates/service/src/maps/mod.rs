@@ -28,5 +28,6 @@ pub(crate) use catalog::Catalog;
 pub use event_log::EVENTS_MAX;
 pub(crate) use full_state::FullState;
 pub(crate) use hosted_map::{HostedMap, RATE_SAMPLES};
+pub(crate) use opening::maps_at_once;
 pub(crate) use saving::Saving;
 pub(crate) use snapshots::snapshot_bytes;

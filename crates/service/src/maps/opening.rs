@@ -36,8 +36,8 @@ pub(super) fn find_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result
     Ok(maps)
 }
 
-/// Maps that are opened at once: it is work for the CPU, and waits for the disk between.
-pub(super) fn openings_at_once() -> usize {
+/// Maps that are opened at once, or saved at the end: it is work for the CPU, and waits for the disk between.
+pub(crate) fn maps_at_once() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).max(2)
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use parking_lot::Mutex;
 
 use super::catalog::Catalog;
-use super::opening::{not_stored, openings_at_once};
+use super::opening::{maps_at_once, not_stored};
 use crate::error::ServiceError;
 use mrol_map::map::MapName;
 use mrol_store::{OpeningProgress, StoreError};
@@ -23,7 +23,7 @@ impl Catalog {
     ) -> Result<(), ServiceError> {
         let all: Vec<_> =
             self.maps.read().asleep.iter().map(|(name, it)| (name.clone(), Arc::clone(it))).collect();
-        let count = openings_at_once().min(all.len());
+        let count = maps_at_once().min(all.len());
         let rest = Mutex::new(all.into_iter());
         let work = || {
             loop {
