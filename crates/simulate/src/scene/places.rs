@@ -38,19 +38,29 @@ fn shell(length_m: f64, width_m: f64) -> Vec<Object> {
 }
 
 /// A rectangular room about the origin with `pieces` of furniture, of kinds, sizes and places drawn from `seed`, none within a meter
-/// of its middle.
-pub(super) fn rectangular_room(seed: u64, length_m: f64, width_m: f64, pieces: usize) -> Vec<Object> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+/// of its middle. The first `moved` of them were carried to other places since.
+pub(super) fn rectangular_room(
+    seed: u64,
+    [length_m, width_m]: [f64; 2],
+    pieces: usize,
+    moved: usize,
+) -> Vec<Object> {
+    let (mut random, mut elsewhere) = (ChaCha8Rng::seed_from_u64(seed), ChaCha8Rng::seed_from_u64(!seed));
+    let place = |random: &mut ChaCha8Rng| {
+        let [x, y] = [length_m, width_m].map(|side_m| random.random_range(-0.5..0.5) * (side_m - 1.6));
+        (x, y, random.random_range(0.0..TAU))
+    };
+    let is_free = |&(x, y, _): &(f64, f64, f64)| x.hypot(y) > FREE_M + 0.8;
     let mut objects = shell(length_m, width_m);
     let mut placed = 0;
     while placed < pieces {
         let piece = KINDS[random.random_range(0..KINDS.len())].build(&mut random);
-        let (x, y) = (
-            random.random_range(-0.5..0.5) * (length_m - 1.6),
-            random.random_range(-0.5..0.5) * (width_m - 1.6),
-        );
-        let yaw = random.random_range(0.0..TAU);
-        if x.hypot(y) > FREE_M + 0.8 {
+        let drawn = Some(place(&mut random)).filter(is_free);
+        let now = drawn.map(|drawn| match placed < moved {
+            true => std::iter::repeat_with(|| place(&mut elsewhere)).find(is_free).unwrap_or(drawn),
+            false => drawn,
+        });
+        if let Some((x, y, yaw)) = now {
             objects.push(piece.placed(x, y, yaw));
             placed += 1;
         }

@@ -33,10 +33,15 @@ impl Scene {
         Self { objects: equal_rooms::equal_rooms(seed, apart_m) }
     }
 
-    /// A room of `length_m` x `width_m` x 2.7 m about the origin, with as many pieces of furniture drawn from `seed`: turned around, its
+    /// A room of `size_m` (length and width) and 2.7 m of height about the origin, with as many pieces of furniture drawn from `seed`: turned around, its
     /// walls look the same.
-    pub fn rectangular_room(seed: u64, [length_m, width_m]: [f64; 2], pieces: usize) -> Self {
-        Self { objects: places::rectangular_room(seed, length_m, width_m, pieces) }
+    pub fn rectangular_room(seed: u64, size_m: [f64; 2], pieces: usize) -> Self {
+        Self { objects: places::rectangular_room(seed, size_m, pieces, 0) }
+    }
+
+    /// The same room after the first `moved` of its pieces were carried to other places.
+    pub fn rearranged_room(seed: u64, size_m: [f64; 2], pieces: usize, moved: usize) -> Self {
+        Self { objects: places::rectangular_room(seed, size_m, pieces, moved) }
     }
 
     /// An aisle along x between shelves, 3 m wide and `length_m` long from x = 0, with an upright every `period_m`.

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use crate::experiment::verdicts::{
-    GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, Set, aisle, random, rooms,
+    GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, RoomTrials, Set, aisle, random, rooms,
 };
 use crate::workload::Scan;
 use mrol::console::error::CliError;
@@ -25,8 +25,8 @@ EXAMPLES:
 
 Each argument is a folder of scans with poses.txt (a TUM file, line k for scan k), the side of a voxel, and the name of the
 place. Its scans are aligned to maps of one, two and half of them, from guesses 0.1 m and 3 degrees to 8 m and 180 degrees off;
-scans of other places too. Simulated: rectangular rooms with 1 to 8 pieces of furniture and people, after an unseen turn by as much as
-looks the same; aisles with an upright every 0.5 to 3 m, by odometry and from the pose before. A pose is right within two voxels and two
+scans of other places too. Simulated: rectangular rooms with 1 to 8 pieces of furniture and up to 12 people, after an unseen turn by as
+much as looks the same (one scan, up to three, and one after a piece was moved), and after a step; aisles with an upright every 0.5 to 3 m, by odometry and from the pose before. A pose is right within two voxels and two
 degrees. Then how rays agree at true poses and at wrong ones, 8 voxels and 10 degrees off, and how many of each a threshold from the other
 sets would tell.";
 
@@ -149,11 +149,20 @@ impl Verdicts {
     fn simulated(&self, settings: &AlignmentSettings, bar: &Output) -> Result<(), CliError> {
         for pieces in PIECES {
             for people in PEOPLE {
-                let [turned, stepped] =
+                let RoomTrials { turned, by_third, rearranged, stepped, hidden } =
                     rooms(self.seed, self.rooms, pieces, people, settings).ok_or_else(no_map)?;
                 bar.step();
-                bar.print(&Line::of(format!("room, {pieces} pieces, {people} people, turned"), turned))?;
-                bar.print(&Line::of(format!("room, {pieces} pieces, {people} people, a step"), stepped))?;
+                let hidden = 100.0 * hidden;
+                let of_room =
+                    format!("room, {pieces} pieces, {people} people ({hidden:.0} % of the view at most)");
+                for (what, outcomes) in [
+                    ("turned", turned),
+                    ("turned, by the third scan", by_third),
+                    ("turned, a piece moved since", rearranged),
+                    ("a step", stepped),
+                ] {
+                    bar.print(&Line::of(format!("{of_room}, {what}"), outcomes))?;
+                }
             }
         }
         for period_m in PERIODS_M {
