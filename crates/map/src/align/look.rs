@@ -167,17 +167,16 @@ mod tests {
 
     #[test]
     fn poses_that_are_equal_in_truth_differ_by_the_deviation_that_is_counted_with() {
-        // In a crowd, three within 48 square meters, they differ by one and a half of it.
-        let (alone, one, crowd) = (deviation_of_equals(0), deviation_of_equals(1), deviation_of_equals(3));
-        assert!(
-            alone < 0.5 && (0.2..1.0).contains(&one) && (one..2.0).contains(&crowd),
-            "{alone} {one} {crowd}"
-        );
+        // With people they differ by up to two of it, most where one viewpoint is asked: then all that contradicts is a few people.
+        for witnesses in [1, 4] {
+            let [alone, one, crowd] = [0, 1, 3].map(|people| deviation_of_equals(people, witnesses));
+            assert!(alone < 0.5 && one < 2.0 && crowd < 2.3, "{witnesses} witnesses: {alone} {one} {crowd}");
+        }
     }
 
     /// The root mean square of z between two poses in a room that looks the same from both, but for people, who stand elsewhere in each
     /// of the scans. Noise of 2 cm.
-    fn deviation_of_equals(people: usize) -> f64 {
+    fn deviation_of_equals(people: usize, witnesses: usize) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut of_people = |people: usize, x: f32, y: f32| {
             let mut at = |half: f32| random.random_range(-half..half);
@@ -194,8 +193,8 @@ mod tests {
         for k in 0..40 {
             let (x, y) = (f32::from(k as u8 % 8) * 0.5 - 1.7, f32::from(k as u8 / 8) * 0.6 - 1.3);
             let places = [(-2.0, -1.0), (-1.0, 1.5), (1.0, 0.0), (2.5, -2.0)];
-            let scans = places.map(|(x, y)| (of_people(people, x, y), x, y));
-            let map = map_with(scans.to_vec(), 0.1);
+            let scans = places[..witnesses].iter().map(|&(x, y)| (of_people(people, x, y), x, y));
+            let map = map_with(scans.collect(), 0.1);
             let points = of_people(people, x, y);
             let settings = AlignmentSettings::default();
             let scan = SampledScan::new(&points, map.lattice().extent_m(), &settings, StopSignal::NEVER);
