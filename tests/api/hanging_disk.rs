@@ -90,6 +90,43 @@ async fn a_map_is_served_while_the_disk_of_another_hangs_and_it_ends_in_time() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn more_maps_whose_disks_hang_than_are_opened_at_once_keep_no_other_from_being_opened_or_made() {
+    let data = tempfile::tempdir().unwrap();
+    let at_once = std::thread::available_parallelism().unwrap().get().max(2);
+    let hanging: Vec<String> = (0..2 * at_once).map(|k| format!("hangs-{k:03}")).collect();
+    let server = Process::start(data.path().to_str().unwrap(), &[]);
+    let made = async |server: &Process, name: &str| {
+        let map = format!("{}/v1/maps/{name}", server.http);
+        client().put(&map).json(&json!({"resolution_m": 0.1})).send().await.unwrap().status()
+    };
+    for name in hanging.iter().map(String::as_str).chain(["well"]) {
+        assert_eq!(made(&server, name).await, StatusCode::CREATED);
+    }
+    assert_eq!(server.stop(), Some(0));
+    for name in &hanging {
+        for file in fs::read_dir(folder_of(data.path(), name)).unwrap().map(|file| file.unwrap().path()) {
+            fs::remove_file(&file).unwrap();
+            make_hang(&file);
+        }
+    }
+
+    let server = Process::start(data.path().to_str().unwrap(), &["--drain-seconds", "1"]);
+    let of = |name: &str| format!("{}/v1/maps/{name}", server.http);
+    for name in &hanging {
+        // Whoever asked is gone soon.
+        let asked = client().delete(of(name)).timeout(Duration::from_millis(200)).send().await;
+        assert!(asked.is_err_and(|gone| gone.is_timeout()));
+    }
+    assert_eq!(made(&server, "new").await, StatusCode::CREATED);
+    assert_eq!(client().get(of("well")).send().await.unwrap().status(), StatusCode::OK);
+    let told = client().get(of(&hanging[0])).send().await.unwrap();
+    assert_eq!(told.status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(json_of(told).await["reason"], "catalog_busy");
+    server.signal("TERM");
+    code_at_end(server).await.expect("it ends by itself");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn with_a_disk_that_hangs_at_the_end_it_ends_within_its_bound() {
     let data = tempfile::tempdir().unwrap();
     let log = data.path().join("log");

@@ -193,7 +193,7 @@ reasons! {
         TimeLimit "time_limit" Both: "the scan or undo took longer than `alignment_time_max_s`, `insertion_time_max_s` or `undo_time_max_s`", "send a smaller scan, or raise the limit";
     }
     Unavailable {
-        CatalogBusy "catalog_busy" Both: "another map has been made, replaced or deleted for long: its disk is slow", "retry as told";
+        CatalogBusy "catalog_busy" Both: "a map has been made, replaced, deleted or opened for long: it is large, or its disk slow", "retry as told";
         Draining "draining" Both: "the server is going down", "retry elsewhere or later";
         MapReadOnly "map_read_only" Both: "the map's journal failed; it answers queries and takes no changes", "mend the disk, restart the server";
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";

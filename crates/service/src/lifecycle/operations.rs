@@ -66,13 +66,13 @@ impl MapService {
     }
 
     /// Describes all maps that the caller may name, by name, those that sleep as they fell asleep. While maps are being
-    /// opened, waits until they are.
+    /// opened, waits until they are, for ten seconds at most.
     ///
     /// # Errors
-    /// `ResourceExhausted` when too many jobs wait.
+    /// `ResourceExhausted` when too many jobs wait, `CatalogBusy` where maps are opened for longer.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let work = async {
-            self.inner.catalog.all_open().await;
+            self.inner.catalog.all_open().await?;
             self.describe_all().await
         };
         self.observed("ListMaps", None, work, |_| Outcome::Read).await

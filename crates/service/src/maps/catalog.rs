@@ -36,6 +36,8 @@ pub(crate) struct Catalog {
     pub(super) openings: Arc<Semaphore>,
     /// How often a request opened a map that slept.
     pub(super) wakes: AtomicU64,
+    /// How far the maps that were there at the start are opened.
+    pub(super) progress: OpeningProgress,
     /// True once every map of the data folder was opened, or could not be.
     pub(super) are_open: watch::Sender<bool>,
     writing: tokio::sync::Mutex<()>,
@@ -60,6 +62,7 @@ impl Catalog {
             commit_threads: CommitThreads::start()?,
             openings: Arc::new(Semaphore::new(maps_at_once())),
             wakes: AtomicU64::new(0),
+            progress: progress.clone(),
             writing: Default::default(),
         })
     }
@@ -161,6 +164,8 @@ impl Catalog {
         maps_max: usize,
         replace: bool,
     ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
+        // Whoever has the turn waits for no map that is opened.
+        self.find(&name).await?;
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
         let old = self.find(&name).await?;
@@ -245,6 +250,8 @@ impl Catalog {
 
     /// Takes a map out; its last version.
     pub(crate) async fn delete(self: &Arc<Self>, name: &Reachable) -> Result<MapVersion, ServiceError> {
+        // Whoever has the turn waits for no map that is opened.
+        self.get(name).await?;
         let _writing = self.turn_to_write().await?;
         let map = self.get(name).await?;
         let folder = map.folder.clone();

@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use super::asleep::Asleep;
-use super::catalog::{Catalog, blocking};
+use super::catalog::Catalog;
 use super::hosted_map::{Closed, HostedMap, RATE_SAMPLES};
 use super::named::Place;
 use super::opening::open_one;
@@ -26,9 +26,18 @@ use crate::resources::ResourceBudget;
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 use mrol_store::{OpeningProgress, StoreError};
+use tokio::time::timeout;
+
+/// How long a request waits for a map that is opened.
+pub(super) const OPENING_MAX: Duration = Duration::from_secs(10);
+/// How long a map that is opened keeps others from being opened, where all places are taken.
+const PLACE_MAX: Duration = Duration::from_secs(5);
 
 impl Catalog {
     /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one is given up.
+    ///
+    /// A disk that hangs under a map keeps nobody waiting for ever, and no other map from being opened: after
+    /// [`PLACE_MAX`] its place goes to another.
     pub(crate) async fn get(self: &Arc<Self>, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
         loop {
             let place = self.look_up(name)?;
@@ -37,19 +46,41 @@ impl Catalog {
                 Place::Asleep(asleep) => asleep,
             };
             // A request that waits holds no thread.
-            let opening = Arc::clone(&asleep.opening).lock_owned().await;
-            let turn = Arc::clone(&self.openings).acquire_owned().await;
-            let (catalog, name) = (Arc::clone(self), name.name().clone());
-            blocking(move || {
-                let woken = catalog.open_asleep(&name, &asleep, &OpeningProgress::default());
-                drop((opening, turn));
-                woken.map_err(|error| {
-                    let message = format!("map {name} cannot be opened now: {error}");
-                    ServiceError::new(Reason::MapUnavailable, message)
-                })
-            })
-            .await?;
+            let opened = timeout(OPENING_MAX, Arc::clone(self).open_for_request(name.name().clone(), asleep));
+            opened.await.unwrap_or_else(|_| Err(still_opening(name.name())))?;
         }
+    }
+
+    /// Opens a map that sleeps, once nobody else does and there is a place.
+    async fn open_for_request(
+        self: Arc<Self>,
+        name: MapName,
+        asleep: Arc<Asleep>,
+    ) -> Result<(), ServiceError> {
+        let opening = Arc::clone(&asleep.opening).lock_owned().await;
+        let turn = Arc::clone(&self.openings).acquire_owned().await;
+        // One that was not opened yet is one of those whose opening is told, and ends with the server.
+        let progress = if asleep.info.is_none() { self.progress.clone() } else { OpeningProgress::default() };
+        let work = tokio::task::spawn_blocking(move || {
+            let woken = self.open_asleep(&name, &asleep, &progress);
+            drop(opening);
+            woken.map(drop).map_err(|error| {
+                let message = format!("map {name} cannot be opened now: {error}");
+                ServiceError::new(Reason::MapUnavailable, message)
+            })
+        });
+        // Whoever asked may go meanwhile; the place is taken for as long as an opening may take.
+        let opened = tokio::spawn(async move {
+            let mut work = work;
+            let in_time = timeout(PLACE_MAX, &mut work).await;
+            drop(turn);
+            match in_time {
+                Ok(opened) => opened,
+                Err(_) => work.await,
+            }
+        });
+        let opened = opened.await.and_then(std::convert::identity);
+        opened.unwrap_or_else(|panic| Err(ServiceError::new(Reason::JobPanicked, panic.to_string())))
     }
 
     /// Opens a map that sleeps, unless somebody else did meanwhile, or it is gone. The caller holds its `opening`. One
@@ -147,6 +178,14 @@ impl Catalog {
         let (awake, asleep) = (maps.open.len(), maps.asleep.len());
         MapsAwake { awake, asleep, wakes: self.wakes.load(Ordering::Relaxed) }
     }
+}
+
+/// A map whose opening takes longer than anybody waits for.
+fn still_opening(name: &MapName) -> ServiceError {
+    let message = format!(
+        "map {name} has been opened for {OPENING_MAX:?} and more: it is large, or its disk hangs; try again"
+    );
+    ServiceError::new(Reason::CatalogBusy, message).retry_after(OPENING_MAX)
 }
 
 impl HostedMap {

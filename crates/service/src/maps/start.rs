@@ -6,9 +6,11 @@ use parking_lot::Mutex;
 
 use super::catalog::Catalog;
 use super::opening::{maps_at_once, not_stored};
-use crate::error::ServiceError;
+use super::sleeping::OPENING_MAX;
+use crate::error::{Reason, ServiceError};
 use mrol_map::map::MapName;
-use mrol_store::{OpeningProgress, StoreError};
+use mrol_store::{Opened, OpeningProgress, StoreError};
+use tokio::time::timeout;
 
 impl Catalog {
     /// Opens the maps of the data folder, side by side; each is served as soon as it is open, and one that fails keeps no
@@ -32,10 +34,9 @@ impl Catalog {
                 let opening = Arc::clone(&asleep.opening).blocking_lock_owned();
                 let is_new = self.open_asleep(&name, &asleep, progress)?;
                 drop(opening);
-                match is_new {
-                    true => opened(&name),
-                    // A request was faster.
-                    false => progress.map_is_open(),
+                // Or a request was faster.
+                if is_new {
+                    opened(&name);
                 }
             }
         };
@@ -45,9 +46,19 @@ impl Catalog {
     }
 
     /// Waits until every map of the data folder was opened, or could not be.
-    pub(crate) async fn all_open(&self) {
+    ///
+    /// # Errors
+    /// `CatalogBusy` where that takes longer than [`OPENING_MAX`].
+    pub(crate) async fn all_open(&self) -> Result<(), ServiceError> {
+        let mut are_open = self.are_open.subscribe();
+        let opened = timeout(OPENING_MAX, are_open.wait_for(|are_open| *are_open)).await;
         // The sender is there as long as this is.
-        drop(self.are_open.subscribe().wait_for(|are_open| *are_open).await);
+        opened.map(drop).map_err(|_| {
+            let Opened { maps, maps_open, .. } = self.progress.opened();
+            let message =
+                format!("{maps_open} of {maps} maps are open: ask for one, or for all once /readyz is ready");
+            ServiceError::new(Reason::CatalogBusy, message).retry_after(OPENING_MAX)
+        })
     }
 
     /// True once every map of the data folder was opened, or could not be.
