@@ -154,7 +154,7 @@ fn an_attack_tells_what_each_honest_caller_waited_for_and_what_became_of_each_at
     let (callers, attackers) = lines.split_at(6);
     assert_eq!(texts(attackers, "attack"), attacks);
     // Attackers are nice: on a machine with other work not each of them has an answer by then.
-    let told = |line: &Value| number(line, "answered") + number(line, "refused");
+    let told = |line: &serde_json::Value| number(line, "answered") + number(line, "refused");
     assert!(attackers.iter().map(told).sum::<f64>() > 0.0, "{attackers:?}");
     for line in callers {
         assert_eq!(
