@@ -78,8 +78,9 @@ pub(super) async fn live(NoParams: NoParams) -> &'static str {
 
 /// Tells whether all maps are open and requests are taken.
 ///
-/// While maps are being opened, those that are open are served: a request for another one waits for it. Maps that take no changes since their journal failed are named to whoever may name them; they answer
-/// queries all the same. So are maps that could not be opened, with what helps: the others are served. A
+/// While maps are being opened, those that are open are served: a request for another one waits for it. Maps
+/// that take no changes since their journal failed are named to whoever may name them; they answer queries all
+/// the same. So are maps that could not be opened, with what helps: the others are served. A
 /// server whose disk or memory is nearly full stays ready.
 #[utoipa::path(
     get,

@@ -149,16 +149,16 @@ impl Server {
         waited.saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
     }
 
-    /// Opens the maps, and serves each as soon as it is open, until `shutdown`; then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
-    /// `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
+    /// Opens the maps, and serves each as soon as it is open, until `shutdown`. Then it goes down: says for
+    /// `drain_delay_s` that it is not ready, refuses what is new, waits `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
     /// saved.
     ///
     /// Idle and half-open connections do not keep it from going down: after their requests connections have
     /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.
     ///
     /// # Errors
-    /// When a listener stops by itself, the maps cannot be opened, or the maps cannot be saved at the end, or not in time: a disk may hang. A thread
-    /// of the runtime is then in its hands, so that the runtime has to be left behind
+    /// When a listener stops by itself, the maps cannot be opened, or they cannot be saved at the end, or not in time:
+    /// a disk may hang. A thread of the runtime is then in its hands, so that the runtime has to be left behind
     /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
         let Self { config, access, tls, service, recorder, lifecycle, progress, .. } = &self;

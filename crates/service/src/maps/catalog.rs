@@ -165,7 +165,9 @@ impl Catalog {
         replace: bool,
     ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
         // Whoever has the turn waits for no map that is opened.
-        self.find(&name).await?;
+        if replace {
+            self.find(&name).await?;
+        }
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
         let old = self.find(&name).await?;
