@@ -3,8 +3,8 @@
 use clap::Subcommand;
 
 use super::{
-    attack, carving, convergence, deskewing, free_space, lookup, mapping, rounds, scaling, simulation,
-    verdicts,
+    attack, carving, convergence, deskewing, free_space, lookup, mapping, rounds, scaling, searches,
+    simulation, verdicts,
 };
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
@@ -24,8 +24,7 @@ EXAMPLES:
                                                what is known to be free, beside OctoMap
   mrol-lab experiment rounds                       what a map keeps of a robot that drives the same way for an hour
   mrol-lab experiment carving                      what a map loses of what is taken away, and keeps of what stands
-  mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
-                                               what is accepted of guesses far off, and of scans of other places
+  mrol-lab experiment searches hall/:0.1:hall      whether lost robots are found, and what that takes
   mrol-lab experiment attack --seconds 120         what honest callers wait for while others ask for all they can
   mrol-lab experiment verdicts hall/:0.1:hall office/:0.04:office
                                                wrong poses accepted and right ones refused; simulated places too
@@ -51,6 +50,7 @@ enum Which {
     Mapping(mapping::Mapping),
     Rounds(rounds::Rounds),
     Scaling(scaling::Scaling),
+    Searches(searches::SearchExperiment),
     Simulation(simulation::Simulation),
     Verdicts(verdicts::Verdicts),
 }
@@ -67,6 +67,7 @@ impl Experiment {
             Which::Mapping(mapping) => mapping.run(&output),
             Which::Rounds(rounds) => rounds.run(&output),
             Which::Scaling(scaling) => scaling.run(&output),
+            Which::Searches(searches) => searches.run(&output),
             Which::Simulation(simulation) => simulation.run(&output),
             Which::Verdicts(verdicts) => verdicts.run(&output),
         }

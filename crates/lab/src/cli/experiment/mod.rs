@@ -10,6 +10,8 @@ mod lookup;
 mod mapping;
 mod rounds;
 mod scaling;
+mod searches;
+mod set_option;
 mod simulation;
 mod verdicts;
 

@@ -2,21 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
-use std::str::FromStr;
 
 use serde::Serialize;
 
+use super::set_option::SetOption;
 use crate::experiment::verdicts::{
-    GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, RoomTrials, Set, aisle, random, rooms,
+    Carved, GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, RoomTrials, Set, aisle, random, rooms,
 };
-use crate::workload::Scan;
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
-use mrol::console::truth::true_poses;
 use mrol_map::align::{AlignmentSettings, RayAgreement};
-use mrol_map::geometry::Pose;
-use mrol_map::scan::{read_points, scan_files};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -51,44 +46,6 @@ pub(super) struct Verdicts {
     seed: u64,
 }
 
-/// A set of scans: its folder, the side of a voxel, and the place it shows.
-#[derive(Debug, Clone)]
-struct SetOption {
-    folder: PathBuf,
-    resolution_m: f64,
-    place: String,
-}
-
-impl FromStr for SetOption {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("must be DIR:RESOLUTION:PLACE, as in hall/:0.1:hall, got {text}");
-        let mut parts = text.rsplitn(3, ':');
-        let (place, resolution_m) = (parts.next(), parts.next().and_then(|text| text.parse().ok()));
-        let (place, resolution_m, folder) = (
-            place.ok_or_else(expected)?,
-            resolution_m.ok_or_else(expected)?,
-            parts.next().ok_or_else(expected)?,
-        );
-        Ok(Self { folder: folder.into(), resolution_m, place: place.to_owned() })
-    }
-}
-
-impl SetOption {
-    /// The scans, with their true poses.
-    fn scans(&self, output: &Output) -> Result<Vec<Scan>, CliError> {
-        let files = scan_files(std::slice::from_ref(&self.folder))?;
-        let poses = true_poses(&self.folder.join("poses.txt"), files.len(), output)?;
-        let scan = |(file, pose): (&PathBuf, Pose)| Ok(Scan::of_finite(read_points(file)?, Some(pose)));
-        files.iter().zip(poses).map(scan).collect()
-    }
-
-    fn name(&self) -> String {
-        self.folder.file_name().unwrap_or(self.folder.as_os_str()).to_string_lossy().into_owned()
-    }
-}
-
 /// Least share of points that agree, of each side, for a pose whose rays tell anything.
 const EVIDENCE_MIN: f64 = 0.2;
 
@@ -97,7 +54,7 @@ impl Verdicts {
         let settings = AlignmentSettings::default();
         let mut sets = Vec::new();
         for set in &self.sets {
-            sets.push(Set::of(&set.name(), &set.place, set.scans(output)?, set.resolution_m, self.scans));
+            sets.push(set.read(self.scans, output)?);
         }
         let steps = sets.len() * MapOf::ALL.len() * (GUESSES.len() + 1)
             + PIECES.len() * PEOPLE.len()
@@ -149,7 +106,7 @@ impl Verdicts {
     fn simulated(&self, settings: &AlignmentSettings, bar: &Output) -> Result<(), CliError> {
         for pieces in PIECES {
             for people in PEOPLE {
-                let RoomTrials { turned, by_third, rearranged, stepped, hidden } =
+                let RoomTrials { turned, by_third, rearranged, stepped, carved, hidden } =
                     rooms(self.seed, self.rooms, pieces, people, settings).ok_or_else(no_map)?;
                 bar.step();
                 let hidden = 100.0 * hidden;
@@ -163,6 +120,7 @@ impl Verdicts {
                 ] {
                     bar.print(&Line::of(format!("{of_room}, {what}"), outcomes))?;
                 }
+                bar.print(&CarvedLine { what: format!("{of_room}, carved of what stands"), carved })?;
             }
         }
         for period_m in PERIODS_M {
@@ -220,6 +178,21 @@ impl Display for Line {
             "{alignments:>10}  {right_accepted:>15}  {refused:>7}  {wrong_accepted:>15}  {wrong_refused:>7}  {what}"
         )?;
         self.right_refused.iter().try_for_each(|(verdict, count)| write!(f, "; {count} {verdict}"))
+    }
+}
+
+/// Voxels of what stands that the scans of some rooms carved.
+#[derive(Serialize)]
+struct CarvedLine {
+    what: String,
+    carved: Carved,
+}
+
+impl Display for CarvedLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Carved { at_found, at_truth, at_wrong } = self.carved;
+        let what = &self.what;
+        write!(f, "{what}: {at_found} voxels where found, {at_truth} where taken, {at_wrong} at wrong poses")
     }
 }
 

@@ -7,11 +7,13 @@
 mod aisles;
 mod outcomes;
 mod rooms;
+mod searches;
 mod sets;
 mod trial;
 
 pub use aisles::{PERIODS_M, aisle};
 pub use outcomes::Outcomes;
-pub use rooms::{PEOPLE, PIECES, RoomTrials, rooms};
+pub use rooms::{Carved, PEOPLE, PIECES, RoomTrials, rooms};
+pub use searches::{KindOfSearch, Searches};
 pub use sets::{GUESSES, MapOf, Set, Trials};
 pub use trial::random;

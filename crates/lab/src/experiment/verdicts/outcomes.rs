@@ -10,6 +10,12 @@ use mrol_map::geometry::{Pose, pose_difference};
 const RIGHT_VOXELS: f64 = 2.0;
 const RIGHT_DEG: f64 = 2.0;
 
+/// True of a pose that is right, in a map of such voxels.
+pub(super) fn is_right(found: &Pose, truth: &Pose, resolution_m: f64) -> bool {
+    let (meters, degrees) = pose_difference(found, truth);
+    meters <= RIGHT_VOXELS * resolution_m && degrees <= RIGHT_DEG
+}
+
 /// What came of alignments: those that found the true pose, and those that ended elsewhere.
 #[derive(Debug, Clone, Default)]
 pub struct Outcomes {
@@ -36,7 +42,7 @@ impl Outcomes {
     ) {
         self.took_ms.push(took.as_secs_f64() * 1e3);
         let error = truth.map(|truth| pose_difference(&alignment.map_from_sensor, truth));
-        let is_right = error.is_some_and(|(m, deg)| m <= RIGHT_VOXELS * resolution_m && deg <= RIGHT_DEG);
+        let is_right = truth.is_some_and(|truth| is_right(&alignment.map_from_sensor, truth, resolution_m));
         match (alignment.verdict, is_right) {
             (Verdict::Accepted, true) => self.right += 1,
             (Verdict::Accepted, false) => self.wrong.push((error, alignment.reason.clone())),
@@ -46,6 +52,12 @@ impl Outcomes {
             }
             (_, false) => self.lost += 1,
         }
+    }
+
+    /// Adds a search that found no place.
+    pub(super) fn add_nothing(&mut self, took: Duration) {
+        self.took_ms.push(took.as_secs_f64() * 1e3);
+        self.lost += 1;
     }
 
     /// Adds those of other alignments.
@@ -65,6 +77,11 @@ impl Outcomes {
         let mut took_ms = self.took_ms.clone();
         took_ms.sort_by(f64::total_cmp);
         took_ms.get(took_ms.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// How long the longest took, milliseconds.
+    pub fn longest_ms(&self) -> f64 {
+        self.took_ms.iter().copied().fold(0.0, f64::max)
     }
 
     /// Number of alignments.

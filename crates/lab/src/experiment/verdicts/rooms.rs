@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::outcomes::Outcomes;
-use super::trial::{SIMULATED_M, aligned, lidar, mapped, on_floor, seen};
-use mrol_map::align::AlignmentSettings;
-use mrol_map::geometry::Pose;
+use super::outcomes::{Outcomes, is_right};
+use super::trial::{SIMULATED_M, aligned, carved, lidar, mapped, on_floor, seen};
+use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
+use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
 use mrol_simulate::Scene;
 
@@ -33,8 +33,42 @@ pub struct RoomTrials {
     pub rearranged: Outcomes,
     /// Of a scan after a step.
     pub stepped: Outcomes,
+    /// Voxels that the accepted ones of the scans in rooms that nobody changed took out of the map, where they were found and where they
+    /// were taken: all of them stand.
+    pub carved: Carved,
     /// The largest share of the view that people hid.
     pub hidden: f64,
+}
+
+/// Voxels of what stands that scans took out of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Carved {
+    /// At the poses that were accepted.
+    pub at_found: usize,
+    /// By the same scans at their true poses.
+    pub at_truth: usize,
+    /// Of the first, those at wrong poses.
+    pub at_wrong: usize,
+}
+
+impl Carved {
+    /// Adds what an accepted scan takes out; none where it cannot be inserted.
+    fn add(
+        &mut self,
+        map: &MultiResolutionMap,
+        points: &[Point],
+        found: &Alignment,
+        truth: &Pose,
+    ) -> Option<()> {
+        if found.verdict != Verdict::Accepted {
+            return Some(());
+        }
+        let at_found = carved(map, points, found)?;
+        self.at_found += at_found;
+        self.at_truth += carved(map, points, &Alignment::trusted(*truth, map.settings().levels, points))?;
+        self.at_wrong += if is_right(&found.map_from_sensor, truth, SIMULATED_M) { 0 } else { at_found };
+        Some(())
+    }
 }
 
 /// Rectangular rooms drawn from `seed`, mapped by eight scans; then the robot is turned unseen, so that the walls look the same, or goes
@@ -67,29 +101,33 @@ pub fn rooms(
         let after = |turn_deg: f64| {
             last * Pose::new(Vector3::new(0.2, -0.1, 0.0), Vector3::z() * turn_deg.to_radians())
         };
-        let mut tried = |map: &MultiResolutionMap, scene: &Scene, truth: &Pose| {
+        let mut tried = |scene: &Scene, truth: &Pose| {
             let points = seen(&lidar, &scene.with_people(crowd, people, [0.0, 0.0]), truth, &mut random);
-            aligned(map, &points, &last.into(), settings)
+            let found = aligned(&map, &points, &last.into(), settings);
+            (points, found)
         };
         trials.hidden =
             trials.hidden.max(hidden(&scene, &scene.with_people(crowd, people, [0.0, 0.0]), &last));
 
         let truth = after(turn_deg);
-        let first = tried(&map, &scene, &truth);
-        trials.turned.add(&first, Some(&truth), SIMULATED_M);
-        let (mut found, mut at) = (first, truth);
+        let (mut points, mut found) = tried(&scene, &truth);
+        trials.turned.add(&found, Some(&truth), SIMULATED_M);
+        let mut at = truth;
         for scan in 1..SCANS_AFTER {
-            if found.0.verdict == mrol_map::align::Verdict::Accepted {
+            if found.0.verdict == Verdict::Accepted {
                 break;
             }
             at = after(turn_deg + f64::from(scan) * STEP_DEG);
-            found = tried(&map, &scene, &at);
+            (points, found) = tried(&scene, &at);
         }
         trials.by_third.add(&found, Some(&at), SIMULATED_M);
+        trials.carved.add(&map, &points, &found.0, &at)?;
         let rearranged = Scene::rearranged_room(room, size_m, pieces, 1);
-        trials.rearranged.add(&tried(&map, &rearranged, &truth), Some(&truth), SIMULATED_M);
+        trials.rearranged.add(&tried(&rearranged, &truth).1, Some(&truth), SIMULATED_M);
         let truth = after(STEP_DEG);
-        trials.stepped.add(&tried(&map, &scene, &truth), Some(&truth), SIMULATED_M);
+        let (points, found) = tried(&scene, &truth);
+        trials.stepped.add(&found, Some(&truth), SIMULATED_M);
+        trials.carved.add(&map, &points, &found.0, &truth)?;
     }
     Some(trials)
 }

@@ -61,10 +61,10 @@ pub struct Set {
 /// A map of some scans of a set, and the scans that are aligned to it.
 #[derive(Debug)]
 pub struct Trials<'a> {
-    map: MultiResolutionMap,
+    pub(super) map: MultiResolutionMap,
     of_map: Vec<Pose>,
-    others: Vec<&'a (Vec<Point>, Pose)>,
-    resolution_m: f64,
+    pub(super) others: Vec<&'a (Vec<Point>, Pose)>,
+    pub(super) resolution_m: f64,
 }
 
 impl Set {

@@ -10,7 +10,7 @@ use crate::experiment::convergence::direction;
 use mrol_map::align::{Alignment, AlignmentSettings, PoseCovariance, PosePrior, align_until};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{MapSettings, MultiResolutionMap, RobotName};
-use mrol_map::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol_map::mapping::{CarvingSettings, Guess, LocatedScan, MappingSettings, Scan, ScanMapper, Sightings};
 use mrol_map::util::StopSignal;
 use mrol_simulate::{Scene, SpinningLidar, gaussian};
 
@@ -53,6 +53,24 @@ pub(super) fn aligned(
     let start = Instant::now();
     let found = align_until(map, points, prior, settings, StopSignal::NEVER);
     (found, start.elapsed())
+}
+
+/// How many voxels of the map an accepted scan takes out, where it was found.
+pub(super) fn carved(map: &MultiResolutionMap, points: &[Point], alignment: &Alignment) -> Option<usize> {
+    let (robot, sightings) = (RobotName::new("surveyor").ok()?, Sightings::default());
+    let carving = Some(CarvingSettings::default());
+    let mapper = ScanMapper::new(map, &sightings, MappingSettings { carving, ..MappingSettings::default() });
+    let located = LocatedScan {
+        guess: alignment.map_from_sensor,
+        alignment: alignment.clone(),
+        align_time: Duration::ZERO,
+        is_first: false,
+        velocity: None,
+        recovered: None,
+    };
+    let scan = Scan::new(&robot, points);
+    let record = mapper.record(&scan, &located, StopSignal::NEVER).ok()?;
+    Some(mapper.carve(&scan, &located, &record, StopSignal::NEVER).ok()?.voxels.len())
 }
 
 /// A lidar of sixteen rings.
