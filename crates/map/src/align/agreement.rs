@@ -110,7 +110,7 @@ impl Rays {
     }
 }
 
-/// Some of the points, from all over a sample.
-pub(super) fn spread(points: &[Point], wish: usize) -> Vec<Point> {
-    points.iter().step_by(points.len().div_ceil(wish).max(1)).copied().collect()
+/// Some of a sample's points, or of other things, from all over it.
+pub(super) fn spread<T: Copy>(all: &[T], wish: usize) -> Vec<T> {
+    all.iter().step_by(all.len().div_ceil(wish).max(1)).copied().collect()
 }

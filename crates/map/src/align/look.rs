@@ -84,7 +84,7 @@ pub fn ray_agreement(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> RayAgreement {
-    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, StopSignal::NEVER);
+    let scan = SampledScan::new(points, map.lattice(), settings, StopSignal::NEVER);
     let rays = Rays::of(map, &scan);
     let witnesses = Witnesses::of(&rays, map, &[*map_from_sensor], StopSignal::NEVER);
     Look::of(&rays, map_from_sensor, &witnesses, StopSignal::NEVER).agreement()
@@ -198,7 +198,7 @@ mod tests {
             let map = map_with(scans.collect(), 0.1);
             let points = of_people(people, x, y);
             let settings = AlignmentSettings::default();
-            let scan = SampledScan::new(&points, map.lattice().extent_m(), &settings, StopSignal::NEVER);
+            let scan = SampledScan::new(&points, map.lattice(), &settings, StopSignal::NEVER);
             let (x, y) = (f64::from(x), f64::from(y));
             let turn = nalgebra::Vector3::z() * std::f64::consts::PI;
             let poses = [Pose::translation(x, y, 0.0), Pose::new(nalgebra::Vector3::new(-x, -y, 0.0), turn)];

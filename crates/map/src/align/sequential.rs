@@ -39,7 +39,7 @@ pub fn align_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = &SampledScan::new(points, map.lattice().extent_m(), settings, stop);
+    let scan = &SampledScan::new(points, map.lattice(), settings, stop);
     let guess = prior.leveled_guess();
     let prior = &PosePrior { guess, ..*prior };
 
@@ -94,7 +94,7 @@ pub fn evaluate_at_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, stop);
+    let scan = SampledScan::new(points, map.lattice(), settings, stop);
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
@@ -106,7 +106,7 @@ pub fn ascend(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Pose {
-    let scan = SampledScan::new(points, voxels.lattice().extent_m(), settings, StopSignal::NEVER);
+    let scan = SampledScan::new(points, voxels.lattice(), settings, StopSignal::NEVER);
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose

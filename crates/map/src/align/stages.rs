@@ -52,7 +52,9 @@ pub(super) fn finish(
     let climbed = ascent.pose;
     match settings.method {
         Method::Refined if map.settings().moments => {
-            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.stop);
+            let surfaces = &mut scan.surfaces.borrow_mut();
+            let refined =
+                refine(map, surfaces, &scan.surface_sample, &climbed, &settings.refinement, scan.stop);
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }
@@ -78,12 +80,13 @@ pub(super) fn fit(
     settings: &AlignmentSettings,
 ) -> Fit {
     let keeps_moments = map.settings().moments;
+    let (sample, surfaces) = (&scan.surface_sample, &mut scan.surfaces.borrow_mut());
     Fit {
         map_from_sensor: ascent.pose,
         refined_by_m,
         slide: if keeps_moments { None } else { Slide::of(map, scan, &ascent.pose, settings) },
         level_overlaps: level_overlaps_until(map, scan.points, &ascent.pose, scan.stop),
-        surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement, scan.stop),
+        surfaces: surface_fit(map, surfaces, sample, &ascent.pose, &settings.refinement, scan.stop),
         iterations: ascent.iterations,
         lookups: ascent.lookups,
     }

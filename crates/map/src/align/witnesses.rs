@@ -12,8 +12,6 @@ use crate::map::{Lookup, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::visibility::{Met, Sight, Viewpoint};
 
-/// Places that a viewpoint met, which are looked for in the image of the scan.
-const POINTS_OF_VIEWPOINT: usize = 500;
 /// Viewpoints that are asked.
 const VIEWPOINTS: usize = 8;
 /// Viewpoints that are asked for each pose, at least.
@@ -77,13 +75,13 @@ impl Witnesses {
         let viewpoints = &self.viewpoints;
         let sights = viewpoints.iter().flat_map(|viewpoint| {
             let others = viewpoints.iter().filter(move |other| !Arc::ptr_eq(other, viewpoint));
-            let met = viewpoint.image().met(POINTS_TO_CHOOSE, ERROR_MAX * tolerance_m);
+            let few = spread(&viewpoint.met(ERROR_MAX * tolerance_m), POINTS_TO_CHOOSE);
             others.flat_map(move |other| {
                 let of_met = |&Met { offset, error_m }: &Met| {
                     let place = viewpoint.map_from_sensor() * Point3::from(offset.map(f64::from));
                     other.image().sight(other.offset(place.into()), tolerance_m + error_m)
                 };
-                met.iter().map(of_met).collect::<Vec<_>>()
+                few.iter().map(of_met).collect::<Vec<_>>()
             })
         });
         RayCounts::of(sights).contradicted_share()
@@ -101,9 +99,15 @@ fn viewpoints_for(
     let distance_m = |viewpoint: &Viewpoint| {
         (viewpoint.map_from_sensor().translation.vector - pose.translation.vector).norm()
     };
-    let mut near: Vec<_> = rays.viewpoints.iter().map(|(_, it)| (distance_m(it), Arc::clone(it))).collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0));
-    near.truncate(NEAR);
+    let in_map = rays.viewpoints.iter();
+    let mut all: Vec<_> = in_map.map(|(revision, it)| (distance_m(it), revision, it)).collect();
+    let nearest_first = |a: &(f64, u64, _), b: &(f64, u64, _)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if all.len() > NEAR {
+        all.select_nth_unstable_by(NEAR, nearest_first);
+        all.truncate(NEAR);
+    }
+    all.sort_unstable_by(nearest_first);
+    let mut near: Vec<_> = all.into_iter().map(|(at_m, _, it)| (at_m, Arc::clone(it))).collect();
     let nearest_m = near.first().map_or(f64::INFINITY, |(distance_m, _)| *distance_m);
     let marched = marched::viewpoints_near(map, pose, nearest_m, wish, stop);
     near.extend(marched.into_iter().map(|viewpoint| (distance_m(&viewpoint), viewpoint)));
@@ -124,11 +128,12 @@ fn viewpoints_for(
 fn met(map: &MultiResolutionMap, viewpoints: &[Arc<Viewpoint>], tolerance_m: f32) -> Vec<MetInMap> {
     let of_viewpoint = |viewpoint: &Arc<Viewpoint>| {
         let map_from_sensor = *viewpoint.map_from_sensor();
-        let met = viewpoint.image().met(POINTS_OF_VIEWPOINT, ERROR_MAX * tolerance_m).into_iter();
-        met.map(move |Met { offset, error_m }| MetInMap {
+        let met = viewpoint.met(ERROR_MAX * tolerance_m);
+        let in_map = |&Met { offset, error_m }: &Met| MetInMap {
             place_m: (map_from_sensor * Point3::from(offset.map(f64::from))).into(),
             error_m,
-        })
+        };
+        met.iter().map(in_map).collect::<Vec<_>>()
     };
     let met: Vec<MetInMap> = viewpoints.iter().flat_map(of_viewpoint).collect();
     let points: Vec<Point> = met.iter().map(|met| Point::from(Point3::from(met.place_m))).collect();

@@ -1,8 +1,14 @@
 //! A viewpoint: where a scan was taken, and how far it saw from there.
 
-use super::range_image::RangeImage;
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use super::range_image::{Met, RangeImage};
 use super::reach::Reach;
 use crate::geometry::Pose;
+
+/// Places that a viewpoint met, which scans are compared with.
+const MET: usize = 500;
 
 /// Where a scan was taken, and how far it saw in each direction (paper III-B).
 #[derive(Debug, Clone, PartialEq)]
@@ -12,6 +18,18 @@ pub struct Viewpoint {
     /// Rows of the rotation from the map to the sensor.
     rotation: [[f32; 3]; 3],
     reach: Reach,
+    met: MetOnce,
+}
+
+/// Some of the places that a viewpoint met, off by at most so many meters: found out once, when they are first asked for. They follow
+/// from the image.
+#[derive(Debug, Clone, Default)]
+struct MetOnce(OnceLock<(f32, Box<[Met]>)>);
+
+impl PartialEq for MetOnce {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// Most bytes of memory of a viewpoint whose image has at most [`IMAGE_BYTES_MAX`](super::IMAGE_BYTES_MAX) bytes: the places of
@@ -24,7 +42,7 @@ impl Viewpoint {
         let rotation = map_from_sensor.rotation.inverse().to_rotation_matrix();
         let row = |r: usize| std::array::from_fn(|c| rotation[(r, c)] as f32);
         let reach = Reach::of(&map_from_sensor, &image);
-        Self { map_from_sensor, image, rotation: std::array::from_fn(row), reach }
+        Self { map_from_sensor, image, rotation: std::array::from_fn(row), reach, met: MetOnce::default() }
     }
 
     /// Where the scan was taken.
@@ -35,6 +53,14 @@ impl Viewpoint {
     /// How far it saw, in the sensor frame.
     pub fn image(&self) -> &RangeImage {
         &self.image
+    }
+
+    /// Some 500 of the places that the scan met, from all over what it saw, none of which is off by more than `error_max_m`. Fast
+    /// where all ask for the same error.
+    pub fn met(&self, error_max_m: f32) -> Cow<'_, [Met]> {
+        let found_out = || self.image.met(MET, error_max_m);
+        let (of_error_m, met) = self.met.0.get_or_init(|| (error_max_m, found_out().into()));
+        if *of_error_m == error_max_m { Cow::Borrowed(met) } else { Cow::Owned(found_out()) }
     }
 
     /// True where the scan saw beyond `point_m` (map frame, meters).
@@ -62,8 +88,8 @@ impl Viewpoint {
         &self.reach
     }
 
-    /// Bytes of memory, those of its places in an index with them.
+    /// Bytes of memory, those of its places in an index and of what it met with them.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + self.image.memory_bytes() + self.reach.memory_bytes()
+        size_of::<Self>() + self.image.memory_bytes() + self.reach.memory_bytes() + MET * size_of::<Met>()
     }
 }

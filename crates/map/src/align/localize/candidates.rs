@@ -80,7 +80,7 @@ impl Refinement<'_> {
 
     /// Aligns `points` from a place. There is no restart from other guesses: the search has covered them.
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
-        let scan = SampledScan::new(points, self.map.lattice().extent_m(), self.alignment, self.stop);
+        let scan = SampledScan::new(points, self.map.lattice(), self.alignment, self.stop);
         let ascent = climb(self.map, &scan, *guess, self.map.settings().levels - 1, self.alignment);
         finish(self.map, &scan, ascent, self.alignment)
     }
@@ -90,7 +90,7 @@ impl Refinement<'_> {
         if candidates.is_empty() {
             return;
         }
-        let scan = SampledScan::new(self.points, self.map.lattice().extent_m(), self.alignment, self.stop);
+        let scan = SampledScan::new(self.points, self.map.lattice(), self.alignment, self.stop);
         let rays = Rays::of(self.map, &scan);
         let contest = Contest { map: self.map, scan: &scan, rays: &rays, settings: self.alignment };
         let places = candidates.iter().map(|candidate| candidate.alignment.clone()).collect();

@@ -29,6 +29,8 @@ pub(super) struct Gaussian {
     variances: Vector3<f64>,
     axes: Matrix3<f64>,
     side_m: f64,
+    /// As it was softened last.
+    softness: Softness,
     /// Variance that [`Gaussian::soften`] added, square meters.
     noise: f64,
     /// Inverse covariance within the determined directions, 1 / m^2.
@@ -52,15 +54,23 @@ impl Gaussian {
             variances: eigen.eigenvalues.map(|variance| variance.max(0.0)),
             axes: eigen.eigenvectors,
             side_m,
+            softness: Softness { std_m: f64::INFINITY, spread: f64::INFINITY },
             noise: f64::INFINITY,
             information: Matrix3::zeros(),
         })
     }
 
-    /// Adds an uncertainty of `softness.std_m` in every direction to the surface's own spread.
+    /// Adds an uncertainty of `softness.std_m` in every direction to the surface's own spread, in place of what was added before.
+    #[inline]
     pub(super) fn soften(&mut self, softness: Softness) {
+        if self.softness != softness {
+            self.soften_anew(softness);
+        }
+    }
+
+    fn soften_anew(&mut self, softness: Softness) {
         let noise = softness.std_m * softness.std_m;
-        self.noise = noise;
+        (self.softness, self.noise) = (softness, noise);
         let without = 1.0 / (softness.spread * self.side_m * self.side_m + noise);
         let information = self.variances.map(|variance| (1.0 / (variance + noise) - without).max(0.0));
         self.information = self.axes * Matrix3::from_diagonal(&information) * self.axes.transpose();

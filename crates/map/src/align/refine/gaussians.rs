@@ -5,36 +5,36 @@ use nalgebra::Vector3;
 
 use super::gaussian::{Gaussian, Softness};
 use super::known_moments::KnownMoments;
-use crate::map::MultiResolutionMap;
 use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
 
 /// Number of voxel sizes that have Gaussians: 4, 8 and 16 r_0. Where the smallest voxels hold too few points to show a
 /// surface, the larger ones, which are sums of them, may.
 const SIZES: usize = 3;
 
-/// The Gaussians of a map's voxels near a scan, computed on demand and cached for one alignment. The map may change
-/// meanwhile; a cached Gaussian stays as it was.
+/// The Gaussians of a map's voxels near a scan, computed on demand and kept for one alignment, with all its ends. The map may
+/// change meanwhile; a Gaussian that is kept stays as it was.
 #[derive(Debug)]
-pub(super) struct VoxelGaussians {
+pub(in crate::align) struct VoxelGaussians {
     resolution_m: f64,
+    /// How soft they are where they are looked up.
     softness: Softness,
     sizes: [HashMap<VoxelKey, Option<u32>>; SIZES],
     gaussians: Vec<Gaussian>,
 }
 
 impl VoxelGaussians {
-    pub(super) fn new(map: &MultiResolutionMap, softness: Softness) -> Self {
-        let resolution_m = map.lattice().resolution_m(0);
+    /// None yet, of a map whose finest voxels have sides of `resolution_m`.
+    pub(in crate::align) fn new(resolution_m: f64) -> Self {
+        let softness = Softness { std_m: 0.0, spread: 0.0 };
         Self { resolution_m, softness, sizes: Default::default(), gaussians: Vec::new() }
     }
 
-    /// Softens all Gaussians, present and future; see [`Gaussian::soften`].
+    /// Softens those that are looked up from now on; see [`Gaussian::soften`].
     pub(super) fn soften(&mut self, softness: Softness) {
         self.softness = softness;
-        self.gaussians.iter_mut().for_each(|gaussian| gaussian.soften(softness));
     }
 
-    /// The Gaussian with index `i`, as [`VoxelGaussians::nearest`] returned it.
+    /// The Gaussian with index `i`, as [`VoxelGaussians::nearest`] returned it since it was last softened.
     pub(super) fn get(&self, i: u32) -> &Gaussian {
         &self.gaussians[i as usize]
     }
@@ -70,6 +70,8 @@ impl VoxelGaussians {
     fn of_voxel(&mut self, moments: &KnownMoments<'_>, index: [i32; 3], size: usize) -> Option<u32> {
         let voxel = VoxelKey::new(index)?;
         if let Some(&known) = self.sizes[size].get(&voxel) {
+            let gaussian = known.and_then(|i| self.gaussians.get_mut(i as usize));
+            gaussian.into_iter().for_each(|gaussian| gaussian.soften(self.softness));
             return known;
         }
         let side_m = self.side_m(size);
@@ -107,7 +109,7 @@ fn moments_of(moments: &KnownMoments<'_>, index: [i32; 3], size: usize) -> Momen
 mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{MapContents, MapSettings, MappedScan, RobotName, ScanRecord};
+    use crate::map::{MapContents, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
     use crate::voxel::{Lattice, MomentSet, VoxelSet};
 
     #[test]

@@ -11,4 +11,5 @@ mod gaussians;
 mod known_moments;
 mod refinement;
 
+pub(super) use gaussians::VoxelGaussians;
 pub(super) use refinement::{SurfaceFit, refine, surface_fit};

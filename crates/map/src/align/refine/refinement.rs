@@ -44,6 +44,7 @@ pub(in crate::align) struct SurfaceFit {
 /// Surfaces are soft at first and harden from stage to stage, so that points find theirs from afar.
 pub(in crate::align) fn refine(
     map: &MultiResolutionMap,
+    gaussians: &mut VoxelGaussians,
     points: &[Point],
     guess: &Pose,
     settings: &RefinementSettings,
@@ -55,7 +56,6 @@ pub(in crate::align) fn refine(
         let std_m = settings.std_m(resolution_m) * 2f64.powi(stage as i32);
         Softness { std_m, spread: SPREAD_TO_REFINE }
     };
-    let mut gaussians = VoxelGaussians::new(map, softness(settings.stages));
     for stage in (0..settings.stages).rev() {
         gaussians.soften(softness(stage));
         for _ in 0..settings.iterations_per_stage_max {
@@ -67,7 +67,7 @@ pub(in crate::align) fn refine(
             let equations = NormalEquations::of(
                 points,
                 pose,
-                &mut gaussians,
+                gaussians,
                 &KnownMoments::of(map),
                 settings.robust_scale,
                 stop,
@@ -89,18 +89,18 @@ pub(in crate::align) fn refine(
 /// the result is meaningless.
 pub(in crate::align) fn surface_fit(
     map: &MultiResolutionMap,
+    gaussians: &mut VoxelGaussians,
     points: &[Point],
     map_from_sensor: &Pose,
     settings: &RefinementSettings,
     stop: StopSignal<'_>,
 ) -> SurfaceFit {
     let std_m = settings.std_m(map.lattice().resolution_m(0));
-    let mut gaussians = VoxelGaussians::new(map, Softness { std_m, spread: SPREAD_TO_JUDGE });
+    gaussians.soften(Softness { std_m, spread: SPREAD_TO_JUDGE });
     let scale = settings.robust_scale;
     let equations =
-        NormalEquations::of(points, map_from_sensor, &mut gaussians, &KnownMoments::of(map), scale, stop);
-    let information =
-        information(points, map_from_sensor, &mut gaussians, &KnownMoments::of(map), scale, stop);
+        NormalEquations::of(points, map_from_sensor, gaussians, &KnownMoments::of(map), scale, stop);
+    let information = information(points, map_from_sensor, gaussians, &KnownMoments::of(map), scale, stop);
     SurfaceFit {
         information: PoseInformation::new(information, points),
         inliers: equations.inliers as f64 / points.len().max(1) as f64,
