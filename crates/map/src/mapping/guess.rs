@@ -13,7 +13,7 @@ pub enum Guess {
     /// This far from the robot's last accepted pose: last_from_sensor, as odometry tells.
     Motion(Pose),
     /// As far from the last accepted pose as that is from the one before it, or in proportion to the time that passed
-    /// where all three scans tell it.
+    /// where all three scans tell it. At the last accepted pose where a scan between these two was refused.
     ConstantVelocity,
 }
 

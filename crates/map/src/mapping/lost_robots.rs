@@ -75,8 +75,6 @@ struct UnderWay {
 pub struct SearchTask {
     number: u64,
     robot: RobotName,
-    /// Which search for this robot it is, from 1.
-    pub(super) of_robot: u64,
     /// Points of the scan to search for, sensor frame, meters.
     pub(super) points: Arc<[Point]>,
     pub(super) query: LocalizationQuery,
@@ -199,7 +197,7 @@ impl LostRobots {
         let (of_robot, timestamp_ns, gravity) = (lost.searches, lost.timestamp_ns, lost.gravity);
         drop(all);
         let query = query(of_robot, timestamp_ns, gravity);
-        Some(SearchTask { number, robot: robot.clone(), of_robot, points, query })
+        Some(SearchTask { number, robot: robot.clone(), points, query })
     }
 
     /// Ends a search, which found the scan at a place (map_from_sensor), or tells why not.

@@ -19,9 +19,10 @@ impl ScanMapper<'_> {
     pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
         let located = self.locate(scan, stop)?;
         let located = self.recover(scan, located, stop)?;
-        if !located.is_accepted() {
-            self.search_at_once(scan, stop);
-        }
+        let located = match located.is_accepted() {
+            true => located,
+            false => self.search_at_once(scan, located, stop),
+        };
         let located = self.told(scan, located);
         self.sightings.note(scan, &located);
         if !located.is_accepted() && !scan.force {

@@ -21,7 +21,7 @@ pub struct RecoverySettings {
     /// How fast the distance grows in which it is looked for, with the time since its last good pose, meters a second.
     /// 5. Where scans have no timestamps, the whole map is searched.
     pub speed_max_m_per_s: f64,
-    /// The first searches take the sensor to be as upright as at its last good pose, which takes a tenth of the time. True.
+    /// The first search takes the sensor to be as upright as at its last good pose, which takes a tenth of the time. True.
     pub keeps_tilt: bool,
     /// Shortest time between two searches for the same robot. 0.
     pub search_interval: Duration,
@@ -42,23 +42,21 @@ impl Default for RecoverySettings {
     }
 }
 
-/// Kinds of searches, one after the other: on coarse voxels with the last good tilt, then on fine ones; the same with all orientations.
-pub(super) const KINDS_OF_SEARCH: u64 = 4;
-/// How much coarser the voxels of the first searches are: so that they take a fifth of the time.
-const COARSER: f64 = 2.0;
+/// Kinds of searches, one after the other: with the last good tilt, and with all orientations.
+pub(super) const KINDS_OF_SEARCH: u64 = 2;
+/// Finest search voxels within a scan's range in these searches: fewer than where a caller asks for one. They find the same places of
+/// real scans, with a fifth of the cells.
+const RESOLUTIONS_PER_RANGE: f64 = 20.0;
 
 impl RecoverySettings {
-    /// How a robot is searched for, the `number`th time (from 1).
-    pub(super) fn search(&self, number: u64) -> LocalizationSettings {
-        let is_coarse = number % 2 == 1;
-        let all = self.localization;
-        let resolutions_per_range = all.resolutions_per_range / if is_coarse { COARSER } else { 1.0 };
-        LocalizationSettings { resolutions_per_range, ..all }
+    /// How a robot is searched for.
+    pub(super) fn search(&self) -> LocalizationSettings {
+        LocalizationSettings { resolutions_per_range: RESOLUTIONS_PER_RANGE, ..self.localization }
     }
 
     /// True of a search that takes the sensor to be as upright as it was, the `number`th (from 1).
     pub(super) fn keeps_tilt_in(&self, number: u64) -> bool {
-        self.keeps_tilt && (number.max(1) - 1) % KINDS_OF_SEARCH < KINDS_OF_SEARCH / 2
+        self.keeps_tilt && !number.is_multiple_of(KINDS_OF_SEARCH)
     }
 }
 

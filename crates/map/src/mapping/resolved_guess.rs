@@ -39,10 +39,10 @@ impl Guess {
                     return Ok(constant_velocity(stamped(last), standing, timestamp_ns));
                 }
                 match trajectory.last_two_of(robot) {
-                    Some((last, before)) => {
+                    Some((last, before)) if !sightings.follows_refused(robot) => {
                         Ok(constant_velocity(stamped(before), stamped(last), timestamp_ns))
                     }
-                    None => last_or_origin(),
+                    _ => last_or_origin(),
                 }
             }
         }

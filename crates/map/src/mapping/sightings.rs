@@ -43,6 +43,8 @@ pub struct Sighting {
 struct Entry {
     last: Sighting,
     standing: Option<Standing>,
+    /// The scan that was accepted last came right after one that was refused.
+    follows_refused: bool,
 }
 
 /// A robot that was seen standing still.
@@ -75,6 +77,9 @@ impl Sightings {
         };
         let mut all = self.0.lock();
         if let Some(entry) = all.get_mut(scan.robot) {
+            if last.verdict == Verdict::Accepted {
+                entry.follows_refused = entry.last.verdict != Verdict::Accepted;
+            }
             entry.last = last;
             return;
         }
@@ -84,7 +89,7 @@ impl Sightings {
                 all.remove(&robot);
             }
         }
-        all.insert(scan.robot.clone(), Entry { last, standing: None });
+        all.insert(scan.robot.clone(), Entry { last, standing: None, follows_refused: false });
     }
 
     /// Notes that the scan of a robot that was noted last, whose last stored scan is `last`, shows it standing still.
@@ -99,6 +104,12 @@ impl Sightings {
     pub(super) fn standing_since(&self, last: &MappedScan) -> Option<Standing> {
         let standing = self.0.lock().get(&last.robot)?.standing;
         standing.filter(|standing| standing.after == last.revision)
+    }
+
+    /// True of a robot whose last accepted scan came right after a refused one: from the one accepted before to it no velocity is
+    /// taken, since it may have been placed too far along.
+    pub(super) fn follows_refused(&self, robot: &RobotName) -> bool {
+        self.0.lock().get(robot).is_some_and(|entry| entry.follows_refused)
     }
 
     /// The last sighting of each robot, by name.
@@ -150,6 +161,18 @@ mod tests {
         assert_eq!(sightings.standing_since(&kept(4)), None);
         // The scan after it was undone: what was seen since the one before it is not known.
         assert_eq!(sightings.standing_since(&kept(2)), None);
+    }
+
+    #[test]
+    fn a_scan_that_is_accepted_after_a_refused_one_tells_no_velocity_and_the_next_one_does() {
+        let (sightings, robot) = (Sightings::default(), robot(1));
+        let follows = |verdict| {
+            seen(&sightings, &robot, verdict);
+            sightings.follows_refused(&robot)
+        };
+        assert!(!follows(Verdict::Accepted) && !follows(Verdict::Accepted));
+        assert!(!follows(Verdict::Ambiguous), "the two before it are as they were");
+        assert!(follows(Verdict::Accepted) && !follows(Verdict::Accepted));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The search for a lost robot.
 
+use std::time::Instant;
+
 use nalgebra::Vector3;
 
 use crate::align::Verdict;
@@ -46,7 +48,7 @@ impl ScanMapper<'_> {
             self.map,
             &task.points,
             &task.query,
-            &recovery.settings.search(task.of_robot),
+            &recovery.settings.search(),
             &self.settings.alignment,
             supervision,
         );
@@ -54,16 +56,28 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// Searches for the robot of a refused scan at once, and for as long as it takes. The next scan has to confirm what is found: a
-    /// camera before a blank wall is found at several walls, and not always doubted.
-    pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
+    /// Searches for the robot of a refused scan at once, and for as long as it takes. Returns the scan where it was found, if it fits
+    /// there, or as it was located; then the robot's next scan is looked for there first.
+    pub(in crate::mapping) fn search_at_once(
+        &self,
+        scan: &Scan<'_>,
+        located: LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> LocatedScan {
+        let start = Instant::now();
+        let points = scan.points_at(located.velocity.as_ref());
         for _ in 0..KINDS_OF_SEARCH {
-            let Some(task) = self.begin_search(scan.robot) else { return };
+            let Some(task) = self.begin_search(scan.robot) else { break };
             let alone =
                 &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
             // An error is noted with the robot, and told with the scan.
             drop(self.search(&task, alone));
+            if let Some((recovered, alignment)) = self.try_place_found(scan, &points, stop) {
+                let align_time = located.align_time + start.elapsed();
+                return LocatedScan { alignment, align_time, recovered: Some(recovered), ..located };
+            }
         }
+        located
     }
 
     /// A refused scan with what the last search for its robot said.
