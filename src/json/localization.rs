@@ -3,6 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::agreement::{JsonRayAgreement, JsonRival};
 use super::described;
 use super::pose::JsonPose;
 use super::version::JsonVersion;
@@ -19,8 +20,11 @@ pub struct JsonLocalization {
     pub verdict: &'static str,
     /// Why, in a sentence.
     pub reason: String,
-    /// The places found, best first.
+    /// The places found, best first: that of the verdict, then those of which rays tell enough, by the share that
+    /// agree, then the others, by overlap.
     pub candidates: Vec<JsonCandidate>,
+    /// Poses that the scan may have been taken at as well as at the first candidate: why it is ambiguous.
+    pub rivals: Vec<JsonRival>,
     /// True where the whole map was searched.
     pub exhaustive: bool,
     /// True of a search whose time was up.
@@ -44,12 +48,8 @@ pub struct JsonCandidate {
     pub overlap: f64,
     /// Fraction of a sample of the points that lie on the map's surfaces.
     pub inliers: f64,
-    /// Fraction of the rays that the map blocks before their points.
-    pub blocked: f64,
-    /// What candidates are ranked by.
-    pub fit: f64,
-    /// The candidate's fit less that of the best other; null where there is no other.
-    pub margin: Option<f64>,
+    /// How rays agree there; null where the search was stopped before they were asked.
+    pub rays: Option<JsonRayAgreement>,
 }
 
 impl From<LocalizationAnswer> for JsonLocalization {
@@ -59,6 +59,7 @@ impl From<LocalizationAnswer> for JsonLocalization {
             verdict: answer.verdict.as_str(),
             reason: answer.reason,
             candidates: answer.candidates.iter().map(JsonCandidate::from).collect(),
+            rivals: answer.rivals.into_iter().map(Into::into).collect(),
             exhaustive: answer.exhaustive,
             cut_short: answer.cut_short,
             search_ms: answer.search_time.as_secs_f64() * 1e3,
@@ -74,9 +75,7 @@ impl From<&CandidateAnswer> for JsonCandidate {
             map_from_sensor: (&candidate.map_from_sensor).into(),
             overlap: candidate.overlap,
             inliers: candidate.inliers,
-            blocked: candidate.blocked,
-            fit: candidate.fit,
-            margin: candidate.margin,
+            rays: candidate.rays.map(Into::into),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! JSON, written once for the HTTP interface, `--json` and the settings file.
 
+mod agreement;
 pub mod described;
 mod event;
 mod keep_out;
@@ -12,6 +13,7 @@ mod scan;
 mod vectors;
 mod version;
 
+pub use self::agreement::{JsonRayAgreement, JsonRayCounts, JsonRival};
 pub use self::event::{JsonEvent, JsonFailure};
 pub use self::keep_out::{JsonKeepOut, JsonShape};
 pub(crate) use self::keyword::described_by_words;

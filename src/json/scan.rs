@@ -3,11 +3,12 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::agreement::{JsonRayAgreement, JsonRival};
 use super::described;
 use super::pose::JsonPose;
 use super::vectors::{PoseMatrix, PoseVector};
 use super::version::JsonVersion;
-use mrol_map::align::{Direction, RayAgreement, RayCounts, Rival};
+use mrol_map::align::Direction;
 use mrol_map::util::Keyword;
 use mrol_service::ScanAnswer;
 
@@ -87,65 +88,6 @@ pub struct JsonDirection {
 impl From<Direction> for JsonDirection {
     fn from(open: Direction) -> Self {
         Self { direction: open.direction, std_m: Some(open.std_m).filter(|std_m| std_m.is_finite()) }
-    }
-}
-
-/// What rays of one side say of a pose.
-#[derive(Debug, Serialize, ToSchema)]
-#[schema(as = RayCounts)]
-pub struct JsonRayCounts {
-    /// Points that were looked for.
-    pub asked: usize,
-    /// Those where the other side met something, too.
-    pub agree: usize,
-    /// Those through which the other side saw.
-    pub contradicted: usize,
-}
-
-/// How the rays of a scan at a pose and those of earlier scans agree.
-#[derive(Debug, Serialize, ToSchema)]
-#[schema(as = RayAgreement)]
-pub struct JsonRayAgreement {
-    /// The share of points that agree, of those of which anything is known: of the side where it is smaller.
-    pub agreement: f64,
-    /// The share of points that agree, of all: of the side where it is smaller.
-    pub evidence: f64,
-    /// The scan's points, in what earlier scans saw.
-    pub of_scan: JsonRayCounts,
-    /// What earlier scans met, in what the scan saw.
-    pub of_map: JsonRayCounts,
-}
-
-/// A pose that a scan may have been taken at as well.
-#[derive(Debug, Serialize, ToSchema)]
-#[schema(as = Rival)]
-pub struct JsonRival {
-    /// The pose of the sensor in the map.
-    pub map_from_sensor: JsonPose,
-    /// How rays agree there.
-    pub rays: JsonRayAgreement,
-}
-
-impl From<RayCounts> for JsonRayCounts {
-    fn from(RayCounts { asked, agree, contradicted }: RayCounts) -> Self {
-        Self { asked, agree, contradicted }
-    }
-}
-
-impl From<RayAgreement> for JsonRayAgreement {
-    fn from(rays: RayAgreement) -> Self {
-        Self {
-            agreement: rays.worse(),
-            evidence: rays.evidence(),
-            of_scan: rays.of_scan.into(),
-            of_map: rays.of_map.into(),
-        }
-    }
-}
-
-impl From<Rival> for JsonRival {
-    fn from(rival: Rival) -> Self {
-        Self { map_from_sensor: (&rival.map_from_sensor).into(), rays: rival.agreement.into() }
     }
 }
 

@@ -96,8 +96,12 @@ async fn a_scan_is_found_alike_on_every_way_in() {
     let best = &found.candidates[0];
     let (meters, degrees) = pose_difference(&best.map_from_sensor, &building.truth);
     assert!(meters < 0.05 && degrees < 0.5, "{meters} m, {degrees} degrees");
-    assert!(best.overlap > 0.5 && best.inliers > 0.5 && best.blocked < 0.4);
-    assert!((best.fit - best.overlap * (1.0 - best.blocked)).abs() < 1e-12);
+    let rays = best.rays.expect("rays were asked");
+    assert!(
+        best.overlap > 0.5 && best.inliers > 0.5 && rays.worse() > 0.9 && rays.evidence() > 0.05,
+        "{rays:?}"
+    );
+    assert!(found.rivals.is_empty(), "{:?}", found.rivals);
     assert_eq!(found.version.revision, 5);
     assert_eq!(found.points_skipped, building.points.iter().filter(|point| !point.is_finite()).count());
 
@@ -125,8 +129,12 @@ async fn a_scan_is_found_alike_on_every_way_in() {
                 pose_difference(&pose_of(&candidate["map_from_sensor"]), &expected.map_from_sensor);
             assert!(meters < 1e-9 && degrees < 1e-5, "{meters} m, {degrees} degrees");
             assert_eq!(candidate["overlap"].as_f64().unwrap(), expected.overlap);
-            assert_eq!(candidate["margin"].as_f64(), expected.margin);
+            let rays = expected.rays.unwrap();
+            assert_eq!(candidate["rays"]["agreement"].as_f64(), Some(rays.worse()));
+            assert_eq!(candidate["rays"]["of_scan"]["agree"].as_u64(), Some(rays.of_scan.agree as u64));
+            assert_eq!(candidate["rays"]["of_map"]["asked"].as_u64(), Some(rays.of_map.asked as u64));
         }
+        assert_eq!(answer["rivals"], json!([]));
     }
 }
 

@@ -26,6 +26,13 @@ fn a_scan_of_a_map_file_is_found_where_it_was_taken() {
     let output = mrol(&arguments).assert().success();
     let table = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     assert!(table.starts_with("0001.ply: ") && table.contains("exhaustive"), "{table}");
+    assert!(table.contains("agreement  evidence"), "{table}");
+    let rays = &found[0]["candidates"][0]["rays"];
+    assert!(
+        rays["agreement"].as_f64().unwrap() > 0.9 && rays["of_scan"]["asked"].as_u64().unwrap() > 100,
+        "{rays}"
+    );
+    assert!(found[0]["rivals"].is_array(), "{}", found[0]);
 }
 
 #[test]

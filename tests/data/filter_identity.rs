@@ -21,6 +21,7 @@ const SMALL: FilterSettings = FilterSettings { hashes: 2, bits_per_key: 2.0 };
 /// No other guesses than the first.
 const NONE: MultiStartSettings = MultiStartSettings {
     fitness_below: 0.0,
+    correction_above: f64::MAX,
     std_above: f64::MAX,
     motion_above: f64::MAX,
     motion_above_deg: f64::MAX,

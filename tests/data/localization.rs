@@ -79,7 +79,7 @@ impl Place {
     /// Localises scan `k` in its own map; true when that was accepted.
     fn is_found(&self, map: &MultiResolutionMap, k: usize, gravity: Option<Gravity>) -> bool {
         let found = self.find(map, k, gravity);
-        let best = found.candidates.first().map_or_else(Pose::identity, |best| best.map_from_sensor());
+        let best = found.candidates.first().map_or_else(Pose::identity, |best| best.map_from_sensor);
         let (meters, degrees) = pose_difference(&best, &self.set.map_from_sensor[k]);
         println!("  {meters:.3} m, {degrees:.2} degrees from the truth");
         assert!(meters < 0.2 && degrees < 2.0, "scan {k}: {meters} m, {degrees} degrees: {}", found.reason);

@@ -1,6 +1,8 @@
 //! Where a robot with no guess is in scenes that look alike, or that the map knows in part.
 
-use mrol::align::localize::{Gravity, LocalizationQuery, LocalizationSettings, MAP_DOWN, localize};
+use mrol::align::localize::{
+    Gravity, Localization, LocalizationQuery, LocalizationSettings, MAP_DOWN, localize,
+};
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
@@ -47,17 +49,20 @@ impl Places {
         mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
     }
 
+    /// Localizes a scan of a robot that stands upright.
+    fn find(&self, points: &[Point], candidates: usize) -> Localization {
+        let gravity = Gravity::new(MAP_DOWN, MAP_DOWN).ok();
+        let query = LocalizationQuery { gravity, candidates, ..LocalizationQuery::default() };
+        let (settings, alignment) = (LocalizationSettings::default(), AlignmentSettings::default());
+        localize(&self.map, points, &query, &settings, &alignment).unwrap()
+    }
+
     /// Localizes a scan of a robot that stands upright: it has to be found where it is, and believed.
     fn assert_found(&self, points: &[Point], map_from_sensor: &Pose) {
-        let query = LocalizationQuery {
-            gravity: Gravity::new(MAP_DOWN, MAP_DOWN).ok(),
-            candidates: 2,
-            ..LocalizationQuery::default()
-        };
-        let (settings, alignment) = (LocalizationSettings::default(), AlignmentSettings::default());
-        let found = localize(&self.map, points, &query, &settings, &alignment).unwrap();
+        let found = self.find(points, 2);
+        assert!(found.rivals.is_empty(), "{:?}", found.rivals);
         assert_eq!(found.verdict, Verdict::Accepted, "{}", found.reason);
-        let (meters, degrees) = pose_difference(&found.candidates[0].map_from_sensor(), map_from_sensor);
+        let (meters, degrees) = pose_difference(&found.candidates[0].map_from_sensor, map_from_sensor);
         assert!(meters < 0.02 && degrees < 0.2, "{meters:.3} m {degrees:.2} deg off");
     }
 }
@@ -82,6 +87,61 @@ fn of_two_floors_with_different_furniture_the_right_one_is_believed() {
             places.assert_found(&points, &(map_from_room * pose));
         }
     }
+}
+
+#[test]
+fn in_a_room_that_looks_the_same_from_two_sides_the_other_side_is_told_as_a_rival() {
+    for seed in 0..4 {
+        let mut places = Places::new(seed);
+        let scene = Scene::rectangular_room(seed, [9.0, 7.0], 0);
+        for k in 0..4 {
+            let pose = places.somewhere(f64::from(k));
+            let points = places.scan(&scene, &pose);
+            places.add(&points, pose);
+        }
+        let pose = places.somewhere(0.3);
+        let points = places.scan(&scene, &pose);
+        // However few candidates are wanted.
+        let found = places.find(&points, 1);
+        assert_eq!(found.verdict, Verdict::Ambiguous, "{}", found.reason);
+        assert_eq!((found.candidates.len(), found.rivals.len()), (1, 1), "{:?}", found.rivals);
+        let (best, rival) = (&found.candidates[0], &found.rivals[0]);
+        let half_turn = Pose::rotation(Vector3::z() * std::f64::consts::PI);
+        for (at, agreement) in
+            [(best.map_from_sensor, best.agreement.unwrap()), (rival.map_from_sensor, rival.agreement)]
+        {
+            assert!(agreement.worse() > 0.98 && agreement.evidence() > 0.2, "{agreement:?}");
+            let errors = [pose, half_turn * pose].map(|pose| pose_difference(&at, &pose));
+            assert!(errors.iter().any(|(meters, degrees)| *meters < 0.05 && *degrees < 0.5), "{errors:?}");
+        }
+        let (meters, degrees) = pose_difference(&best.map_from_sensor, &rival.map_from_sensor);
+        assert!(meters > 0.1 || degrees > 170.0, "{meters} m {degrees} deg apart");
+    }
+}
+
+#[test]
+fn candidates_are_ranked_by_the_rays_that_agree() {
+    let mut is_that_of_overlap = true;
+    for seed in 0..4 {
+        let mut places = Places::new(seed);
+        let scene = Scene::rectangular_room(200 + seed, [9.0, 7.0], 3);
+        for k in 0..4 {
+            let pose = places.somewhere(f64::from(k));
+            let points = places.scan(&scene, &pose);
+            places.add(&points, pose);
+        }
+        let pose = places.somewhere(0.3);
+        let points = places.scan(&scene, &pose);
+        let found = places.find(&points, 16);
+        assert!(found.candidates.len() > 1, "{:?}", found.candidates);
+        let shares: Vec<f64> =
+            found.candidates.iter().map(|candidate| candidate.agreement.unwrap().worse()).collect();
+        assert!(shares.is_sorted_by(|a, b| a >= b), "{shares:?}");
+        is_that_of_overlap &= found.candidates.is_sorted_by(|a, b| a.overlap >= b.overlap);
+        let (meters, degrees) = pose_difference(&found.candidates[0].map_from_sensor, &pose);
+        assert!(meters < 0.02 && degrees < 0.2, "{meters:.3} m {degrees:.2} deg off: {shares:?}");
+    }
+    assert!(!is_that_of_overlap, "the order by overlap is another one");
 }
 
 #[test]

@@ -58,8 +58,9 @@ extern "C" {
 #endif
 
 /* Version of this interface. A library is of use to programs that were compiled against the same one. From 2 on keep-outs count:
- * a library of version 1 knows none, and says free where they are. */
-#define MROL_ABI_VERSION 2
+ * a library of version 1 knows none, and says free where they are. From 3 on a localization tells `agreement`, in place of
+ * `fit`. */
+#define MROL_ABI_VERSION 3
 
 /* Bytes of a reason and of a message with their terminating zero. */
 #define MROL_REASON_BYTES 48
@@ -709,11 +710,12 @@ typedef struct mrol_localization_answer {
     /* The best place: x y z qx qy qz qw; the identity where there is none. */
     double map_from_sensor[7];
     double overlap;
-    /* Overlap times the share of rays that the map does not block: by what places are ranked. */
-    double fit;
+    /* The share of rays that agree there, of those of which anything is known: of the scan's or of earlier scans', where
+     * it is smaller. 0 where nothing is known. */
+    double agreement;
     /* How many places were found. */
     uint64_t candidates;
-    /* 1: the best place fits, and no other is as good. */
+    /* 1: rays believe the best place, and no other is as likely. */
     uint8_t is_accepted;
     /* 1: the time was up. */
     uint8_t is_cut_short;

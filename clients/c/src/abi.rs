@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::memory::{self, Question};
 
 /// Version of the interface: `MROL_ABI_VERSION`.
-pub(crate) const VERSION: u32 = 2;
+pub(crate) const VERSION: u32 = 3;
 /// Bytes of a reason and of a message, with their zero: `MROL_REASON_BYTES`, `MROL_MESSAGE_BYTES`.
 pub(crate) const REASON_BYTES: usize = 48;
 pub(crate) const MESSAGE_BYTES: usize = 464;
@@ -278,7 +278,7 @@ mod tests {
             "mrol_scan" Scan { struct_size robot session scan_id xyz count guess motion gravity timestamp_ns point_times_s has_scan_id has_timestamp at_guess force reserved }
             "mrol_scan_answer" ScanOutcome { version map_from_sensor overlap information new_voxels carved_voxels points_skipped is_accepted is_replayed is_stationary has_information reserved verdict reason }
             "mrol_localization" Localization { struct_size xyz count gravity time_limit_ms seed }
-            "mrol_localization_answer" Localized { map_from_sensor overlap fit candidates is_accepted is_cut_short reserved verdict reason }
+            "mrol_localization_answer" Localized { map_from_sensor overlap agreement candidates is_accepted is_cut_short reserved verdict reason }
             "mrol_body" BodyHandle { number }
             "mrol_link" LinkParts { spheres spheres_count points points_count padding_m reserved }
             "mrol_region" RegionNumbers { kind reserved numbers }

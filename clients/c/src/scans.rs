@@ -89,7 +89,7 @@ unsafe impl Question for Localization {
 pub struct Localized {
     pub(crate) map_from_sensor: [f64; 7],
     pub(crate) overlap: f64,
-    pub(crate) fit: f64,
+    pub(crate) agreement: f64,
     pub(crate) candidates: u64,
     pub(crate) is_accepted: u8,
     pub(crate) is_cut_short: u8,
@@ -201,7 +201,7 @@ impl Localized {
             map_from_sensor: best
                 .map_or([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], |best| seven_of(&best.map_from_sensor)),
             overlap: best.map_or(0.0, |best| best.overlap),
-            fit: best.map_or(0.0, |best| best.fit),
+            agreement: best.and_then(|best| best.rays).map_or(0.0, |rays| rays.worse()),
             candidates: answer.candidates.len() as u64,
             is_accepted: (answer.verdict == Verdict::Accepted).into(),
             is_cut_short: answer.cut_short.into(),

@@ -127,7 +127,7 @@ int main(void) {
 
     FIELD(mrol_localization_answer, map_from_sensor);
     FIELD(mrol_localization_answer, overlap);
-    FIELD(mrol_localization_answer, fit);
+    FIELD(mrol_localization_answer, agreement);
     FIELD(mrol_localization_answer, candidates);
     FIELD(mrol_localization_answer, is_accepted);
     FIELD(mrol_localization_answer, is_cut_short);

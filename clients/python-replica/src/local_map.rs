@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mrol_client::align::localize::{Gravity, LocalizationQuery, SearchBox};
-use mrol_client::align::{Method, PoseCovariance, RayAgreement};
+use mrol_client::align::{Method, PoseCovariance, RayAgreement, Rival};
 use mrol_client::bloom::FilterSettings;
 use mrol_client::geometry::Pose;
 use mrol_client::map::{MapName, MapSettings, RobotName};
@@ -130,8 +130,7 @@ fn answer_of<'py>(py: Python<'py>, answer: &ScanAnswer, points: usize) -> PyResu
     let undetermined: Vec<_> = answer.undetermined.iter().map(|of| (of.direction, of.std_m)).collect();
     fields.set_item("undetermined", undetermined)?;
     fields.set_item("rays", answer.rays.map(sides_of))?;
-    let rivals = answer.rivals.iter().map(|of| (seven_of(&of.map_from_sensor), sides_of(of.agreement)));
-    fields.set_item("rivals", rivals.collect::<Vec<_>>())?;
+    fields.set_item("rivals", answer.rivals.iter().map(rival_of).collect::<Vec<_>>())?;
     fields.set_item("iterations", answer.iterations)?;
     fields.set_item("align_ms", answer.align_time.as_secs_f64() * 1e3)?;
     fields.set_item("new_voxels", answer.new_voxels)?;
@@ -147,6 +146,11 @@ fn answer_of<'py>(py: Python<'py>, answer: &ScanAnswer, points: usize) -> PyResu
 /// Asked, agree and contradicted, of the scan and of the map.
 fn sides_of(rays: RayAgreement) -> [[usize; 3]; 2] {
     [rays.of_scan, rays.of_map].map(|side| [side.asked, side.agree, side.contradicted])
+}
+
+/// A pose and how rays agree there.
+fn rival_of(rival: &Rival) -> (Seven, [[usize; 3]; 2]) {
+    (seven_of(&rival.map_from_sensor), sides_of(rival.agreement))
 }
 
 fn name() -> Result<MapName, Failure> {
@@ -270,9 +274,10 @@ impl NativeLocalMap {
             fields.set_item("verdict", found.verdict.as_str())?;
             fields.set_item("reason", found.reason)?;
             let of = |of: &mrol_client::service::CandidateAnswer| {
-                (seven_of(&of.map_from_sensor), of.overlap, of.inliers, of.blocked, of.fit, of.margin)
+                (seven_of(&of.map_from_sensor), of.overlap, of.inliers, of.rays.map(sides_of))
             };
             fields.set_item("candidates", found.candidates.iter().map(of).collect::<Vec<_>>())?;
+            fields.set_item("rivals", found.rivals.iter().map(rival_of).collect::<Vec<_>>())?;
             fields.set_item("exhaustive", found.exhaustive)?;
             fields.set_item("cut_short", found.cut_short)?;
             fields.set_item("search_ms", found.search_time.as_secs_f64() * 1e3)?;

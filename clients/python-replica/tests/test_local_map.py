@@ -68,6 +68,11 @@ def test_it_finds_where_a_scan_was_taken(mapped: mrol_replica.LocalMap) -> None:
     assert found.accepted, found.reason
     assert found.map_from_sensor is not None
     np.testing.assert_allclose(found.map_from_sensor.translation_m, truth, atol=0.05)
+    best = found.candidates[0].rays
+    assert best is not None
+    assert best.of_scan.share > 0.9
+    anywhere = mapped.localize(room(truth, seed=5), gravity_in_sensor=[0, 0, -1], time_limit_s=30)
+    assert bool(anywhere.rivals) == (anywhere.verdict == "ambiguous")
 
 
 def test_files_go_to_a_server_and_back(server: Server, mapped: mrol_replica.LocalMap, tmp_path: Path) -> None:

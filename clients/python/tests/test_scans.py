@@ -105,8 +105,29 @@ def test_a_robot_that_is_lost_is_localized(hall: mrol.Map) -> None:
     best = found.candidates[0]
     assert found.map_from_sensor is (best.map_from_sensor if found.accepted else None)
     np.testing.assert_allclose(best.map_from_sensor.translation_m, truth, atol=0.2)
+    assert best.rays is not None
+    assert best.rays.of_scan.share > 0.9
+    assert best.rays.of_map.evidence > 0.05
+    assert bool(found.rivals) == (found.verdict == "ambiguous")
     boxed = hall.localize(room(truth, seed=7), search_box=[[-2, 0, -1], [0, 1, 1]], gravity_in_sensor=[0, 0, -1], time_limit_s=5)
     np.testing.assert_allclose(boxed.candidates[0].map_from_sensor.translation_m, truth, atol=0.2)
+
+
+def test_a_place_that_is_as_likely_is_told_as_a_rival(empty: mrol.Map) -> None:
+    # A room of a floor, four walls and nothing in it looks the same after half a turn.
+    along = np.linspace(-1, 1, 81)
+    x, y, z = (side.reshape(-1) for side in np.meshgrid(along * 4, along * 3, along))
+    walls = np.stack([x, y, z], 1)[(np.abs(x) == 4) | (np.abs(y) == 3) | (z == -1)].astype(np.float32)
+    empty.insert(walls, align=False)
+    moved = np.array([0.6, -0.4, 0], np.float32)
+    found = empty.with_timeout(60).localize(walls - moved, gravity_in_sensor=[0, 0, -1], candidates=1, time_limit_s=30)
+    assert found.verdict == "ambiguous", found.reason
+    assert found.map_from_sensor is None
+    assert len(found.candidates) == 1
+    places = [found.candidates[0].map_from_sensor.translation_m, *(rival.map_from_sensor.translation_m for rival in found.rivals)]
+    for expected in (moved, -moved):
+        assert any(np.allclose(place[:2], expected[:2], atol=0.1) for place in places), places
+    assert all(rival.rays.of_scan.share > 0.9 for rival in found.rivals)
 
 
 def test_a_trajectory_has_the_poses_in_pages_or_at_once(empty: mrol.Map) -> None:

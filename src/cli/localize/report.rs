@@ -6,7 +6,7 @@ use std::fmt::Display;
 use serde::Serialize;
 
 use crate::cli::scan_report::{PLACE_HEAD, place};
-use mrol::json::JsonLocalization;
+use mrol::json::{JsonLocalization, JsonPose, JsonRival};
 use mrol_service::LocalizationAnswer;
 
 #[derive(Serialize)]
@@ -33,20 +33,28 @@ impl Display for Localized {
         let seconds = answer.search_ms / 1e3;
         write!(f, "{}: {}: {} ({seconds:.2} s, {how})", scan, answer.verdict, answer.reason)?;
         if !answer.candidates.is_empty() {
-            write!(f, "\n  {PLACE_HEAD}      qx      qy      qz      qw  overlap  blocked     fit   margin")?;
+            write!(f, "\n  {PLACE_HEAD}      qx      qy      qz      qw  overlap  agreement  evidence")?;
         }
         for candidate in &answer.candidates {
-            let [qx, qy, qz, qw] = candidate.map_from_sensor.rotation_xyzw;
-            let margin = candidate.margin.map_or_else(|| "-".into(), |margin| format!("{margin:.3}"));
-            write!(
-                f,
-                "\n  {}  {qx:>6.3}  {qy:>6.3}  {qz:>6.3}  {qw:>6.3}  {:>7.3}  {:>7.3}  {:>6.3}  {margin:>7}",
-                place(&candidate.map_from_sensor),
-                candidate.overlap,
-                candidate.blocked,
-                candidate.fit,
-            )?;
+            write!(f, "\n  {}  {:>7.3}", pose(&candidate.map_from_sensor), candidate.overlap)?;
+            match &candidate.rays {
+                Some(rays) => write!(f, "  {:>9.3}  {:>8.3}", rays.agreement, rays.evidence)?,
+                None => write!(f, "  {:>9}  {:>8}", "-", "-")?,
+            }
+        }
+        if !answer.rivals.is_empty() {
+            write!(f, "\n  as likely:")?;
+        }
+        for JsonRival { map_from_sensor, rays } in &answer.rivals {
+            write!(f, "\n  {}  {:>7}", pose(map_from_sensor), "")?;
+            write!(f, "  {:>9.3}  {:>8.3}", rays.agreement, rays.evidence)?;
         }
         Ok(())
     }
+}
+
+/// A pose as columns: place, then rotation.
+fn pose(pose: &JsonPose) -> String {
+    let [qx, qy, qz, qw] = pose.rotation_xyzw;
+    format!("{}  {qx:>6.3}  {qy:>6.3}  {qz:>6.3}  {qw:>6.3}", place(pose))
 }

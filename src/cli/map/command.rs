@@ -72,7 +72,7 @@ pub(crate) struct Map {
     /// Put the scans at their true poses, without aligning
     #[arg(long, requires = "truth", conflicts_with = "first_pose")]
     at_truth: bool,
-    /// Share of a scan's points that must fall in occupied voxels for it to be accepted [default: 0.2]
+    /// Share of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say [default: 0]
     #[arg(long, value_name = "SHARE")]
     min_overlap: Option<f64>,
     /// Leave a robot lost once its scans are refused. Otherwise each refused scan is aligned from other guesses, then

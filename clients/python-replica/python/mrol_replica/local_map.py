@@ -158,10 +158,14 @@ class LocalMap(Questions):
             0 if candidates is None else whole_of(candidates, "candidates", 1, (1 << 32) - 1),
             whole_of(seed, "seed"),
         )
-        of_place = [Candidate(Pose.of(pose), *figures) for pose, *figures in found.pop("candidates")]
+        of_place = [
+            Candidate(Pose.of(pose), overlap, inliers, None if sides is None else _rays(sides))
+            for pose, overlap, inliers, sides in found.pop("candidates")
+        ]
+        rivals = tuple(_rival(*of) for of in found.pop("rivals"))
         accepted = found["verdict"] == "accepted"
         version = version_of(found.pop("version"))
-        return Localization(version=version, accepted=accepted, candidates=tuple(of_place), **found)
+        return Localization(version=version, accepted=accepted, candidates=tuple(of_place), rivals=rivals, **found)
 
     def voxels(self, level: int = 0, *, box: "BoxLike | OrientedBox | None" = None) -> Voxels:
         """The occupied voxels of a level: all, or those with their centers in a box: see `mrol.Map.voxels`."""
@@ -189,7 +193,7 @@ class LocalMap(Questions):
             "information": None if information is None else np.array(information),
             "undetermined": tuple(OpenDirection(np.array(direction), std_m) for direction, std_m in told["undetermined"]),
             "rays": None if told["rays"] is None else _rays(told["rays"]),
-            "rivals": tuple(Rival(Pose.of(pose), _rays(sides)) for pose, sides in told["rivals"]),
+            "rivals": tuple(_rival(*of) for of in told["rivals"]),
             "foreground": None if foreground is None else foreground.reshape(shape),
         }
         return ScanAnswer(replayed=False, robot=robot, session="", scan_id=None, **told)
@@ -201,6 +205,10 @@ class LocalMap(Questions):
 def _rays(sides: "list[list[int]]") -> RayAgreement:
     of_scan, of_map = (RayCounts(*side) for side in sides)
     return RayAgreement(of_scan, of_map)
+
+
+def _rival(pose: "list[float]", sides: "list[list[int]]") -> Rival:
+    return Rival(Pose.of(pose), _rays(sides))
 
 
 def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":

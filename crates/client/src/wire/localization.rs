@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::pb;
 use super::scan::verdict_from;
 use super::values::{InField, count_from, required};
+use mrol_map::align::Rival;
 use mrol_map::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use mrol_map::map::MapName;
 use mrol_service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, ServiceError};
@@ -67,6 +68,7 @@ impl From<LocalizationAnswer> for pb::LocalizeResponse {
             verdict: pb::Verdict::from(answer.verdict).into(),
             reason: answer.reason,
             candidates: answer.candidates.into_iter().map(Into::into).collect(),
+            rivals: answer.rivals.iter().map(Into::into).collect(),
             exhaustive: answer.exhaustive,
             cut_short: answer.cut_short,
             search_ms: answer.search_time.as_secs_f64() * 1e3,
@@ -82,9 +84,7 @@ impl From<CandidateAnswer> for pb::Candidate {
             map_from_sensor: Some((&candidate.map_from_sensor).into()),
             overlap: candidate.overlap,
             inliers: candidate.inliers,
-            blocked: candidate.blocked,
-            fit: candidate.fit,
-            margin: candidate.margin,
+            rays: candidate.rays.map(Into::into),
         }
     }
 }
@@ -98,6 +98,12 @@ impl TryFrom<pb::LocalizeResponse> for LocalizationAnswer {
             verdict: verdict_from(answer.verdict).in_field("verdict")?,
             reason: answer.reason,
             candidates: answer.candidates.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            rivals: answer
+                .rivals
+                .into_iter()
+                .map(Rival::try_from)
+                .collect::<Result<_, _>>()
+                .in_field("rivals")?,
             exhaustive: answer.exhaustive,
             cut_short: answer.cut_short,
             search_time,
@@ -116,9 +122,7 @@ impl TryFrom<pb::Candidate> for CandidateAnswer {
             map_from_sensor: map_from_sensor.try_into().in_field("candidates.map_from_sensor")?,
             overlap: candidate.overlap,
             inliers: candidate.inliers,
-            blocked: candidate.blocked,
-            fit: candidate.fit,
-            margin: candidate.margin,
+            rays: candidate.rays.map(Into::into),
         })
     }
 }

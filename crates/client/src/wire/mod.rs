@@ -4,6 +4,7 @@
 //! back, so that the daemon and the client share one definition. What cannot be converted is an error that
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
+mod agreement;
 mod block;
 pub mod codec;
 mod deletion;

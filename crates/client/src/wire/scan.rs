@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::pb;
 use super::values::{InField, count_from, required};
 use mrol_map::align::localize::{Gravity, MAP_DOWN};
-use mrol_map::align::{Direction, Method, PoseCovariance, RayAgreement, RayCounts, Rival, Verdict};
+use mrol_map::align::{Direction, Method, PoseCovariance, Rival, Verdict};
 use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_map::mapping::{Guess, Recovered};
 use mrol_map::scan::PointFilter;
@@ -282,49 +282,6 @@ impl From<&ScanAnswer> for pb::Alignment {
     }
 }
 
-impl From<RayCounts> for pb::RayCounts {
-    fn from(RayCounts { asked, agree, contradicted }: RayCounts) -> Self {
-        Self { asked: asked as u64, agree: agree as u64, contradicted: contradicted as u64 }
-    }
-}
-
-impl From<pb::RayCounts> for RayCounts {
-    fn from(pb::RayCounts { asked, agree, contradicted }: pb::RayCounts) -> Self {
-        Self { asked: count_from(asked), agree: count_from(agree), contradicted: count_from(contradicted) }
-    }
-}
-
-impl From<RayAgreement> for pb::RayAgreement {
-    fn from(rays: RayAgreement) -> Self {
-        Self { of_scan: Some(rays.of_scan.into()), of_map: Some(rays.of_map.into()) }
-    }
-}
-
-impl From<pb::RayAgreement> for RayAgreement {
-    fn from(rays: pb::RayAgreement) -> Self {
-        let counts = |side: Option<pb::RayCounts>| side.unwrap_or_default().into();
-        Self { of_scan: counts(rays.of_scan), of_map: counts(rays.of_map) }
-    }
-}
-
-impl From<&Rival> for pb::Rival {
-    fn from(rival: &Rival) -> Self {
-        Self { map_from_sensor: Some((&rival.map_from_sensor).into()), rays: Some(rival.agreement.into()) }
-    }
-}
-
-impl TryFrom<pb::Rival> for Rival {
-    type Error = ServiceError;
-
-    fn try_from(rival: pb::Rival) -> Result<Self, ServiceError> {
-        let map_from_sensor = required(rival.map_from_sensor, "alignment.rivals.map_from_sensor")?;
-        Ok(Self {
-            map_from_sensor: map_from_sensor.try_into().in_field("alignment.rivals.map_from_sensor")?,
-            agreement: rival.rays.unwrap_or_default().into(),
-        })
-    }
-}
-
 impl From<&Direction> for pb::Direction {
     fn from(open: &Direction) -> Self {
         Self { direction: open.direction.to_vec(), std_m: open.std_m }
@@ -428,7 +385,12 @@ impl TryFrom<pb::AlignScanResponse> for ScanAnswer {
                 .map(Direction::try_from)
                 .collect::<Result<_, _>>()?,
             rays: alignment.rays.map(Into::into),
-            rivals: alignment.rivals.into_iter().map(Rival::try_from).collect::<Result<_, _>>()?,
+            rivals: alignment
+                .rivals
+                .into_iter()
+                .map(Rival::try_from)
+                .collect::<Result<_, _>>()
+                .in_field("alignment.rivals")?,
             iterations: alignment.iterations,
             align_time: Duration::try_from_secs_f64(alignment.align_ms / 1e3).unwrap_or_default(),
             points_skipped: count_from(alignment.points_skipped),

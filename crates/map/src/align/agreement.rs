@@ -79,6 +79,11 @@ impl RayCounts {
 }
 
 impl RayAgreement {
+    /// True where rays were asked at all: not once the work was stopped.
+    pub(super) fn is_asked(&self) -> bool {
+        self.of_scan.asked > 0
+    }
+
     /// The smaller share of both sides.
     pub fn worse(&self) -> f64 {
         self.of_scan.share().min(self.of_map.share())

@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use super::agreement::{RayAgreement, Rays, Rival};
+use super::fit::Fit;
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
-use super::verdict::{Alignment, Verdict};
+use super::verdict::Verdict;
 use super::witnesses::Witnesses;
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
@@ -45,7 +46,7 @@ fn tilt_deg(a: &Pose, b: &Pose) -> f64 {
 /// Where an ascent ended, with what speaks for and against it.
 #[derive(Debug)]
 pub(super) struct End {
-    pub(super) alignment: Alignment,
+    pub(super) fit: Fit,
     pub(super) agreement: RayAgreement,
     look: Look,
     /// How far it is from the guess, in standard deviations of what is known beforehand.
@@ -72,7 +73,7 @@ pub(super) struct Ends<'a> {
 impl<'a> Ends<'a> {
     /// The ends of some ascents, which must not be none.
     pub(super) fn of(
-        found: Vec<Alignment>,
+        found: Vec<Fit>,
         map: &MultiResolutionMap,
         rays: &'a Rays,
         prior: Option<PosePrior>,
@@ -87,24 +88,42 @@ impl<'a> Ends<'a> {
             Self { all: Vec::new(), lookups, rays, witnesses, prior, resolution_m, overlap_min, stop };
         // Of those at one place the one that fits best.
         let mut found = found;
-        let fit = |end: &Alignment| if map.settings().moments { end.fitness } else { end.overlap() };
-        found.sort_by(|a, b| fit(b).total_cmp(&fit(a)));
+        let closeness = |end: &Fit| if map.settings().moments { end.fitness } else { end.overlap() };
+        found.sort_by(|a, b| closeness(b).total_cmp(&closeness(a)));
         found.into_iter().for_each(|found| ends.push(found));
         ends
     }
 
     /// Adds the end of another ascent, if it lies elsewhere.
-    pub(super) fn add(&mut self, found: Alignment) {
+    pub(super) fn add(&mut self, found: Fit) {
         self.lookups += found.lookups;
         if !self.stop.is_stopped() {
             self.push(found);
         }
     }
 
-    fn push(&mut self, found: Alignment) {
-        let is_known = self.all.iter().any(|end| {
-            is_same_place(&end.alignment.map_from_sensor, &found.map_from_sensor, self.resolution_m)
+    /// Sorts the ends: first those at which the scan and earlier scans saw enough of each other, by the smaller share
+    /// of rays that agree; then the others, by overlap. Of those that `is_same_place` says are one place, the first is
+    /// kept.
+    pub(super) fn rank(&mut self, is_same_place: impl Fn(&Pose, &Pose) -> bool) {
+        let known = |end: &End| has_evidence(&end.agreement).then(|| end.agreement.worse());
+        self.all.sort_by(|a, b| {
+            let by_rays = known(b).unwrap_or(-1.0).total_cmp(&known(a).unwrap_or(-1.0));
+            by_rays.then(b.fit.overlap().total_cmp(&a.fit.overlap()))
         });
+        let mut places: Vec<Pose> = Vec::new();
+        self.all.retain(|End { fit, .. }| {
+            let is_new = !places.iter().any(|place| is_same_place(place, &fit.map_from_sensor));
+            places.extend(is_new.then_some(fit.map_from_sensor));
+            is_new
+        });
+    }
+
+    fn push(&mut self, found: Fit) {
+        let is_known = self
+            .all
+            .iter()
+            .any(|end| is_same_place(&end.fit.map_from_sensor, &found.map_from_sensor, self.resolution_m));
         if !is_known {
             self.all.push(self.end(found));
         }
@@ -114,30 +133,30 @@ impl<'a> Ends<'a> {
     /// nothing of another.
     pub(super) fn hear_further_witnesses(&mut self, map: &MultiResolutionMap) {
         let unseen = self.all.iter().filter(|end| !has_evidence(&end.agreement));
-        let poses: Vec<Pose> = unseen.map(|end| end.alignment.map_from_sensor).collect();
+        let poses: Vec<Pose> = unseen.map(|end| end.fit.map_from_sensor).collect();
         if self.stop.is_stopped() || poses.is_empty() {
             return;
         }
         self.witnesses.add(self.rays, map, &poses, self.stop);
         let ends = std::mem::take(&mut self.all);
-        self.all = ends.into_iter().map(|end| self.end(end.alignment)).collect();
+        self.all = ends.into_iter().map(|end| self.end(end.fit)).collect();
     }
 
     /// Leaves open which way the robot was turned.
     pub(super) fn open_yaw(&mut self) {
         self.prior = self.prior.map(PosePrior::with_open_yaw);
         for k in 0..self.all.len() {
-            self.all[k].deviations = self.deviations(&self.all[k].alignment.map_from_sensor);
+            self.all[k].deviations = self.deviations(&self.all[k].fit.map_from_sensor);
         }
     }
 
-    fn end(&self, alignment: Alignment) -> End {
-        let pose = &alignment.map_from_sensor;
+    fn end(&self, fit: Fit) -> End {
+        let pose = &fit.map_from_sensor;
         let (look, deviations) =
             (Look::of(self.rays, pose, &self.witnesses, self.stop), self.deviations(pose));
         let agreement = look.agreement();
-        let against = self.reason_against(&alignment, &agreement);
-        End { alignment, agreement, look, deviations, against }
+        let against = self.reason_against(&fit, &agreement);
+        End { fit, agreement, look, deviations, against }
     }
 
     /// How far a pose is from the guess, in standard deviations.
@@ -146,7 +165,7 @@ impl<'a> Ends<'a> {
     }
 
     /// Why a pose is not to be believed, whatever its rivals are.
-    fn reason_against(&self, found: &Alignment, agreement: &RayAgreement) -> Option<(Verdict, String)> {
+    fn reason_against(&self, found: &Fit, agreement: &RayAgreement) -> Option<(Verdict, String)> {
         let RayAgreement { of_scan, of_map } = agreement;
         if !has_evidence(agreement) {
             let (a, b) = (of_scan.evidence(), of_map.evidence());
@@ -182,16 +201,16 @@ impl<'a> Ends<'a> {
 
     /// The end that rays contradict least, of those that may be believed.
     pub(super) fn preferred(&self) -> Option<&End> {
-        let fit = self.all.iter().filter(|end| end.against.is_none());
-        fit.reduce(|best, end| if end.is_contradicted_more_than(best) < 0.0 { end } else { best })
+        let believable = self.all.iter().filter(|end| end.against.is_none());
+        believable.reduce(|best, end| if end.is_contradicted_more_than(best) < 0.0 { end } else { best })
     }
 
     /// The end of least cost, of those that may be believed; where there are none, the one that fits best.
     pub(super) fn best(&self) -> &End {
         let cost = |end: &&End| self.preferred().map_or(0.0, |preferred| end.cost(preferred));
-        let fit = self.all.iter().filter(|end| end.against.is_none());
-        let by_fitness = |a: &&End, b: &&End| a.alignment.fitness.total_cmp(&b.alignment.fitness);
-        let best = fit.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let believable = self.all.iter().filter(|end| end.against.is_none());
+        let by_fitness = |a: &&End, b: &&End| a.fit.fitness.total_cmp(&b.fit.fitness);
+        let best = believable.min_by(|a, b| cost(a).total_cmp(&cost(b)));
         best.or_else(|| self.all.iter().max_by(by_fitness)).unwrap_or(&self.all[0])
     }
 
@@ -202,15 +221,13 @@ impl<'a> Ends<'a> {
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
         let own = best.cost(preferred);
-        let is_elsewhere =
-            |pose: &Pose| !is_same_place(pose, &best.alignment.map_from_sensor, self.resolution_m);
+        let is_elsewhere = |pose: &Pose| !is_same_place(pose, &best.fit.map_from_sensor, self.resolution_m);
         let is_as_likely = |end: &&End| {
             end.cost(preferred) - own <= RIVAL || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
         };
         let ends = self.all.iter().filter(|end| has_evidence(&end.agreement));
-        let ends = ends.filter(|end| is_elsewhere(&end.alignment.map_from_sensor)).filter(is_as_likely);
-        let of_end =
-            |end: &End| Rival { map_from_sensor: end.alignment.map_from_sensor, agreement: end.agreement };
+        let ends = ends.filter(|end| is_elsewhere(&end.fit.map_from_sensor)).filter(is_as_likely);
+        let of_end = |end: &End| Rival { map_from_sensor: end.fit.map_from_sensor, agreement: end.agreement };
         ends.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
     }
 
@@ -220,7 +237,7 @@ impl<'a> Ends<'a> {
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
     fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {
         let map_from_sensor = self.prior?.guess;
-        if is_same_place(&map_from_sensor, &best.alignment.map_from_sensor, self.resolution_m) {
+        if is_same_place(&map_from_sensor, &best.fit.map_from_sensor, self.resolution_m) {
             return None;
         }
         let look = Look::of(self.rays, &map_from_sensor, &self.witnesses, self.stop);

@@ -8,7 +8,8 @@
 //! sequential      align, align_until    the composing function
 //! sampled_scan    step 1                a volumetric sample (III-A)
 //! stages          steps 2 to 5          an ascent at each level (ascent, overlap), and the sub-voxel stage (refine)
-//! verdict                               whether to believe the pose (information, slide, prior)
+//! fit                                   how the scan fits at a pose, and what holds it there (information, slide)
+//! verdict                               whether to believe the pose, and what is told of it
 //! agreement       Rays, RayAgreement    the rays of a scan, and how many agree
 //! look            ray_agreement         what rays say of a scan at a pose, point by point
 //! witnesses                             which earlier scans are asked, and what they met
@@ -29,6 +30,7 @@ mod ascent;
 mod elsewhere;
 mod ends;
 mod extent;
+mod fit;
 mod gravity;
 mod information;
 pub mod localize;
@@ -54,7 +56,7 @@ pub use information::{Direction, PoseInformation};
 pub use look::ray_agreement;
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
 pub use prior::{PoseCovariance, PoseCovarianceError, PosePrior};
-pub use sequential::{align, align_until, ascend, evaluate_at, evaluate_at_until};
+pub use sequential::{align, align_until, ascend, evaluate_at};
 pub use settings::{
     AlignmentSettings, AlignmentSettingsError, Method, MultiStartSettings, RefinementSettings,
 };

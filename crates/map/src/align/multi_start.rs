@@ -6,19 +6,19 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::ascent::Ascent;
 use super::ends::is_same_place;
+use super::fit::Fit;
 use super::overlap::Overlap;
 use super::prior::PosePrior;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
 use super::stages::{climb, finish};
-use super::verdict::Alignment;
 use crate::geometry::Pose;
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 
 /// Turns of the further guesses about each axis, degrees: the basin of a coarsest level's ascent is some 20 wide.
 const TURNS_DEG: [f64; 4] = [-40.0, -20.0, 20.0, 40.0];
-/// Number of the best ascents that are refined and judged.
+/// Number of the best ascents that are refined.
 const FINISHED: usize = 2;
 
 /// Ascends from the most promising of many guesses around the prior's, and returns where they ended, with the number of look-ups that
@@ -28,7 +28,7 @@ pub(super) fn ends(
     scan: &SampledScan<'_>,
     prior: &PosePrior,
     settings: &AlignmentSettings,
-) -> (Vec<Alignment>, u64) {
+) -> (Vec<Fit>, u64) {
     let coarse = map.settings().levels.saturating_sub(2);
     let shift_m = map.lattice().resolution_m(coarse);
     let resolution_m = map.lattice().resolution_m(0);

@@ -6,9 +6,10 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
-use super::agreement::{RayAgreement, RayCounts, Rays};
+use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
 use super::ends::{End, Ends, RIVAL};
+use super::fit::Fit;
 use super::prior::PosePrior;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
@@ -39,7 +40,7 @@ pub(super) struct Contest<'a> {
 
 impl Contest<'_> {
     /// The best of `found`, which must not be empty, and of what fits as well elsewhere, with a verdict.
-    pub(super) fn decide(&self, found: Vec<Alignment>, prior: &PosePrior) -> Alignment {
+    pub(super) fn decide(&self, found: Vec<Fit>, prior: &PosePrior) -> Alignment {
         let mut ends = self.ends(found, Some(*prior));
         let best = ends.best();
         let is_doubted = self.is_doubted(best, &ends);
@@ -48,7 +49,7 @@ impl Contest<'_> {
         }
         // Whoever was turned away unseen may stand at any yaw, and where things repeat the scan fits at each of them.
         let may_have_turned = is_doubted || prior.leaves_yaw_open();
-        let others = self.others(&best.alignment, prior, is_doubted, may_have_turned);
+        let others = self.others(&best.fit, prior, is_doubted, may_have_turned);
         if others.is_empty() || self.settings.multi_start.ascents == 0 {
             return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&ends) };
         }
@@ -63,12 +64,20 @@ impl Contest<'_> {
         self.judged(&ends)
     }
 
-    /// Which of some places that a search found is the best, with a verdict: nothing is known beforehand. `places` must not be empty.
-    pub(super) fn decide_among(&self, places: Vec<Alignment>) -> Alignment {
-        self.judged(&self.ends(places, None))
+    /// Places that a search found, looked at by rays and [ranked](Ends::rank): nothing is known beforehand. Of those
+    /// that `is_same_place` says are one, the best is kept.
+    pub(super) fn rank(&self, places: Vec<Fit>, is_same_place: impl Fn(&Pose, &Pose) -> bool) -> Ends<'_> {
+        let mut ends = self.ends(places, None);
+        ends.rank(is_same_place);
+        ends
     }
 
-    fn ends(&self, found: Vec<Alignment>, prior: Option<PosePrior>) -> Ends<'_> {
+    /// Which of the places that a search found is the best, with a verdict. They must not be none.
+    pub(super) fn decide_among(&self, places: &Ends<'_>) -> Alignment {
+        self.judged(places)
+    }
+
+    fn ends(&self, found: Vec<Fit>, prior: Option<PosePrior>) -> Ends<'_> {
         Ends::of(found, self.map, self.rays, prior, self.settings, self.scan.stop)
     }
 
@@ -77,7 +86,7 @@ impl Contest<'_> {
     /// robot may have taken a lift.
     fn others(
         &self,
-        found: &Alignment,
+        found: &Fit,
         prior: &PosePrior,
         is_doubted: bool,
         may_have_turned: bool,
@@ -118,14 +127,20 @@ impl Contest<'_> {
     /// The verdict on the best of the ends.
     fn judged(&self, ends: &Ends<'_>) -> Alignment {
         let best = ends.best();
-        let alignment = Alignment {
+        let (verdict, reason, rivals) = self.verdict_on(best, ends);
+        Alignment {
             agreement: Some(best.agreement),
+            rivals,
             contradicted_both_ways: self.is_doubted(best, ends),
             lookups: ends.lookups,
-            ..best.alignment.clone()
-        };
+            ..best.fit.clone().told(verdict, reason)
+        }
+    }
+
+    /// The verdict on the best of the ends, why, and the rivals that make it ambiguous.
+    fn verdict_on(&self, best: &End, ends: &Ends<'_>) -> (Verdict, String, Vec<Rival>) {
         if let Some((verdict, reason)) = best.against.clone() {
-            return alignment.but(verdict, reason);
+            return (verdict, reason, Vec::new());
         }
         let agree = told(&best.agreement);
         let rivals = ends.rivals_of(best);
@@ -136,12 +151,12 @@ impl Contest<'_> {
                 "{agree}; of {count} other poses the first, at {x:.2} {y:.2} {z:.2} m, is as likely: {}",
                 told(&rival.agreement)
             );
-            return Alignment { rivals, ..alignment }.but(Verdict::Ambiguous, reason);
+            return (Verdict::Ambiguous, reason, rivals);
         }
         if let Some(aside) = self.slides_to(best, ends) {
-            return alignment.but(Verdict::Undetermined, format!("{agree}, and as well {aside}"));
+            return (Verdict::Undetermined, format!("{agree}, and as well {aside}"), Vec::new());
         }
-        let held_m = alignment.information.directions()[0].std_m;
+        let held_m = best.fit.information.directions()[0].std_m;
         // A search has no guess.
         let from_guess = match ends.prior {
             Some(_) => format!(", {:.1} standard deviations from the guess", best.deviations),
@@ -149,15 +164,15 @@ impl Contest<'_> {
         };
         let moments = if self.map.settings().moments { "" } else { "; the map keeps no moments" };
         let reason = format!("{agree}{from_guess}, held to {held_m:.4} m in every direction{moments}");
-        alignment.but(Verdict::Accepted, reason)
+        (Verdict::Accepted, reason, Vec::new())
     }
 
     /// Where rays contradict the scan hardly more than at `end`, a little aside or turned, as far as the prior allows: they do not hold
     /// it.
     fn slides_to(&self, end: &End, ends: &Ends<'_>) -> Option<String> {
-        let pose = &end.alignment.map_from_sensor;
+        let pose = &end.fit.map_from_sensor;
         let aside_m = ASIDE_VOXELS * self.map.lattice().resolution_m(0);
-        let axis = least_held(&end.alignment).unwrap_or_else(Vector2::x);
+        let axis = least_held(&end.fit).unwrap_or_else(Vector2::x);
         let across = Vector2::new(-axis.y, axis.x);
         let shifts = [axis, -axis, across, -across].map(|way| (way * aside_m, 0.0));
         let turns = [ASIDE_DEG, -ASIDE_DEG].map(|degrees| (Vector2::zeros(), degrees));
@@ -178,7 +193,7 @@ impl Contest<'_> {
 }
 
 /// The direction on the floor along which the map's surfaces hold a pose least; none where turns are all that is open.
-fn least_held(found: &Alignment) -> Option<Vector2<f64>> {
+fn least_held(found: &Fit) -> Option<Vector2<f64>> {
     let directions = found.information.directions().into_iter();
     let on_floor = directions.map(|open| Vector2::new(open.direction[0], open.direction[1]));
     on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())

@@ -2,14 +2,15 @@
 
 use super::agreement::Rays;
 use super::ascent::Ascent;
+use super::fit::Fit;
 use super::multi_start;
 use super::overlap::OccupiedVoxels;
 use super::prior::PosePrior;
 use super::rivals::Contest;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
-use super::stages::{climb, climb_sub_voxel, finish, fit};
-use super::verdict::Alignment;
+use super::stages::{climb, climb_sub_voxel, finish};
+use super::verdict::{Alignment, Verdict};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
@@ -76,18 +77,9 @@ const FINE: u32 = 1;
 /// Ascents that end nearer to each other than r_0 and so many degrees are refined as one.
 const SAME_END_DEG: f64 = 1.0;
 
-/// Judges how a scan fits the map at the pose `map_from_sensor`, without moving it.
+/// Measures how a scan fits the map at the pose `map_from_sensor`, without moving it: accepted, since the caller
+/// says so. Once `stop` is set, the result is meaningless.
 pub fn evaluate_at(
-    map: &MultiResolutionMap,
-    points: &[Point],
-    map_from_sensor: &Pose,
-    settings: &AlignmentSettings,
-) -> Alignment {
-    evaluate_at_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
-}
-
-/// [`evaluate_at`] under a stop signal. Once `stop` is set, the result is meaningless.
-pub fn evaluate_at_until(
     map: &MultiResolutionMap,
     points: &[Point],
     map_from_sensor: &Pose,
@@ -95,7 +87,8 @@ pub fn evaluate_at_until(
     stop: StopSignal<'_>,
 ) -> Alignment {
     let scan = SampledScan::new(points, map.lattice(), settings, stop);
-    fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
+    let fit = Fit::of(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings);
+    fit.told(Verdict::Accepted, "the caller's word".into())
 }
 
 /// Runs the paper's ascent alone (III-B, steps 1 to 5) on any structure of occupied voxels, and returns the pose where

@@ -65,9 +65,6 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where more than this fraction of the overlap is left after such a shift. 0.85: along a blank
     /// wall or a corridor 0.92 and more are left, in a furnished room at most 0.7.
     pub slide_overlap_max: f64,
-    /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
-    /// where anything holds it. 8.
-    pub refinement_max_correction: f64,
     /// Largest angle between the direction of gravity that a scan tells and down in the map, degrees. 5: what an
     /// accelerometer says of a robot that brakes at 1 m/s2 is 6 off, at half of that 3.
     pub gravity_error_max_deg: f64,
@@ -107,6 +104,9 @@ pub struct MultiStartSettings {
     /// Starts again from more guesses where the fitness of the first result is below this. 0.85; 0 never does. A scan
     /// of what the map shows has 0.9 or more; one that shows much new ground has less, and takes a few times as long.
     pub fitness_below: f64,
+    /// Starts again from more guesses where the refinement moved the end of an ascent by more than this many r_0: where
+    /// anything holds it, it ends within a few. 8.
+    pub correction_above: f64,
     /// Starts again from more guesses where a pose is held to no better than this fraction of r_0 in some direction.
     /// 0.1.
     pub std_above: f64,
@@ -137,7 +137,6 @@ impl Default for AlignmentSettings {
             undetermined_std: 0.2,
             slide: 5.0,
             slide_overlap_max: 0.85,
-            refinement_max_correction: 8.0,
             gravity_error_max_deg: 5.0,
             covariance_deviations_max: 4.7,
             lookup: Lookup::Bloom,
@@ -153,7 +152,14 @@ impl Default for RefinementSettings {
 
 impl Default for MultiStartSettings {
     fn default() -> Self {
-        Self { fitness_below: 0.85, std_above: 0.1, motion_above: 12.0, motion_above_deg: 30.0, ascents: 8 }
+        Self {
+            fitness_below: 0.85,
+            correction_above: 8.0,
+            std_above: 0.1,
+            motion_above: 12.0,
+            motion_above_deg: 30.0,
+            ascents: 8,
+        }
     }
 }
 
@@ -195,9 +201,9 @@ impl AlignmentSettings {
             ("undetermined_std", self.undetermined_std),
             ("slide", self.slide),
             ("slide_overlap_max", self.slide_overlap_max),
-            ("refinement_max_correction", self.refinement_max_correction),
             ("gravity_error_max_deg", self.gravity_error_max_deg),
             ("covariance_deviations_max", self.covariance_deviations_max),
+            ("multi_start.correction_above", self.multi_start.correction_above),
             ("multi_start.std_above", self.multi_start.std_above),
             ("multi_start.motion_above", self.multi_start.motion_above),
             ("multi_start.motion_above_deg", self.multi_start.motion_above_deg),

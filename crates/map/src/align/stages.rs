@@ -1,13 +1,12 @@
 //! Steps 2 to 5 of an alignment (paper III-B): ascents from level to level, and the sub-voxel stage.
 
 use super::ascent::{Ascent, Steps};
+use super::fit::Fit;
 use super::information::root_mean_square_range_m;
-use super::overlap::{OccupiedVoxels, Overlap, level_overlaps_until};
-use super::refine::{refine, surface_fit};
+use super::overlap::{OccupiedVoxels, Overlap};
+use super::refine::refine;
 use super::sampled_scan::SampledScan;
 use super::settings::{AlignmentSettings, Method};
-use super::slide::Slide;
-use super::verdict::{Alignment, Fit};
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 
@@ -42,13 +41,13 @@ pub(super) fn climb_sub_voxel(
     }
 }
 
-/// 5) as in the paper, or by [`refine`] in its place where the map keeps moments; and a verdict.
+/// 5) as in the paper, or by [`refine`] in its place where the map keeps moments; and how the scan fits there.
 pub(super) fn finish(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
     mut ascent: Ascent,
     settings: &AlignmentSettings,
-) -> Alignment {
+) -> Fit {
     let climbed = ascent.pose;
     match settings.method {
         Method::Refined if map.settings().moments => {
@@ -61,33 +60,6 @@ pub(super) fn finish(
         Method::Refined | Method::Overlap => climb_sub_voxel(map, scan, &mut ascent, settings),
     }
     let (meters, degrees) = pose_difference(&climbed, &ascent.pose);
-    fit(
-        map,
-        scan,
-        ascent,
-        meters + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample),
-        settings,
-    )
-    .judged(map, settings)
-}
-
-/// Measures how a scan fits at the end of an ascent, which the last stage moved by `refined_by_m`.
-pub(super) fn fit(
-    map: &MultiResolutionMap,
-    scan: &SampledScan<'_>,
-    ascent: Ascent,
-    refined_by_m: f64,
-    settings: &AlignmentSettings,
-) -> Fit {
-    let keeps_moments = map.settings().moments;
-    let (sample, surfaces) = (&scan.surface_sample, &mut scan.surfaces.borrow_mut());
-    Fit {
-        map_from_sensor: ascent.pose,
-        refined_by_m,
-        slide: if keeps_moments { None } else { Slide::of(map, scan, &ascent.pose, settings) },
-        level_overlaps: level_overlaps_until(map, scan.points, &ascent.pose, scan.stop),
-        surfaces: surface_fit(map, surfaces, sample, &ascent.pose, &settings.refinement, scan.stop),
-        iterations: ascent.iterations,
-        lookups: ascent.lookups,
-    }
+    let refined_by_m = meters + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample);
+    Fit::of(map, scan, ascent, refined_by_m, settings)
 }

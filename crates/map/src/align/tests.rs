@@ -53,7 +53,7 @@ fn judging_a_pose_looks_at_the_signal_in_proportion_to_its_work() {
         let looks = Cell::new(0u64);
         let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
         let (points, stop) = (corner(count), StopSignal::when(&count_look));
-        evaluate_at_until(&map, &points, &Pose::identity(), &settings(Method::Overlap), stop);
+        evaluate_at(&map, &points, &Pose::identity(), &settings(Method::Overlap), stop);
         let levels = u64::from(map.settings().levels);
         let work = levels * points.len() as u64 / looks.get();
         assert!(work <= LOOKUPS_PER_LOOK as u64, "{count} points: {work} look-ups a look");

@@ -3,10 +3,8 @@
 use super::agreement::{RayAgreement, Rival};
 use super::information::{Direction, PoseInformation};
 use super::prior::PosePrior;
-use super::refine::SurfaceFit;
 use super::settings::AlignmentSettings;
-use super::slide::Slide;
-use crate::geometry::{Point, Pose, pose_difference};
+use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
 
 /// Whether to believe the pose that an alignment found.
@@ -63,9 +61,6 @@ pub struct Alignment {
     pub information: PoseInformation,
     /// Directions of the pose that the map's surfaces leave open, the least certain first.
     pub undetermined: Vec<Direction>,
-    /// Distance that the refinement moved the end of the ascent, meters; rotations count by the scan's root mean square
-    /// range.
-    pub refined_by_m: f64,
     /// How rays agree there; none where the caller knows the pose.
     pub agreement: Option<RayAgreement>,
     /// Poses that the scan may have been taken at as well: why it is [ambiguous](Verdict::Ambiguous).
@@ -94,23 +89,6 @@ impl Alignment {
         !self.contradicted_both_ways
     }
 
-    /// True where other poses should be looked for: off the surfaces, far from where the refinement went, weakly held,
-    /// or far from the guess.
-    pub(super) fn is_doubtful(
-        &self,
-        guess: &Pose,
-        map: &MultiResolutionMap,
-        settings: &AlignmentSettings,
-    ) -> bool {
-        let (resolution_m, multi_start) = (map.lattice().resolution_m(0), &settings.multi_start);
-        let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
-        self.fitness < multi_start.fitness_below
-            || self.refined_by_m > settings.refinement_max_correction * resolution_m
-            || self.information.directions()[0].std_m > multi_start.std_above * resolution_m
-            || meters > multi_start.motion_above * resolution_m
-            || degrees > multi_start.motion_above_deg
-    }
-
     /// Changes the verdict from accepted where the pose contradicts what was known of it beforehand.
     pub(super) fn within_prior(
         self,
@@ -131,83 +109,8 @@ impl Alignment {
     pub fn but(self, verdict: Verdict, reason: String) -> Self {
         Self { verdict, reason, ..self }
     }
-}
 
-/// How a scan fits at a pose, before it is judged.
-#[derive(Debug)]
-pub(super) struct Fit {
-    pub(super) map_from_sensor: Pose,
-    /// Distance that the refinement moved the pose, meters; rotations count by the points' range.
-    pub(super) refined_by_m: f64,
-    /// What a shift leaves of the overlap, where the map does not know its surfaces.
-    pub(super) slide: Option<Slide>,
-    pub(super) level_overlaps: Vec<f64>,
-    pub(super) surfaces: SurfaceFit,
-    pub(super) iterations: u32,
-    pub(super) lookups: u64,
-}
-
-impl Fit {
-    /// Turns the fit into an alignment with a verdict: accepted with enough overlap, determined in every direction, and
-    /// where the ascent had led.
-    pub(super) fn judged(self, map: &MultiResolutionMap, settings: &AlignmentSettings) -> Alignment {
-        let resolution_m = map.lattice().resolution_m(0);
-        let (overlap, overlap_min) = (self.level_overlaps[0], settings.overlap_min);
-        let open_m = settings.undetermined_std * resolution_m;
-        let max_correction_m = settings.refinement_max_correction * resolution_m;
-        let information = match &self.slide {
-            Some(slide) if slide.share > settings.slide_overlap_max => {
-                self.surfaces.information.without(&slide.direction)
-            }
-            _ => self.surfaces.information,
-        };
-        let undetermined = information.undetermined(open_m);
-        let (verdict, reason) = if overlap < overlap_min {
-            (Verdict::LowOverlap, format!("overlap {overlap:.3} is below overlap_min {overlap_min}"))
-        } else if let Some(worst) = undetermined.first() {
-            (Verdict::Undetermined, format!("open along {worst}, at most {open_m:.3} m is accepted"))
-        } else if self.refined_by_m > max_correction_m {
-            let moved_m = self.refined_by_m;
-            let reason = format!(
-                "the refinement moved it by {moved_m:.3} m, at most {max_correction_m:.3} m is accepted"
-            );
-            (Verdict::Undetermined, reason)
-        } else {
-            let reason = match &self.slide {
-                None => format!(
-                    "overlap {overlap:.3}, held to {:.4} m in every direction",
-                    information.directions()[0].std_m
-                ),
-                Some(slide) => format!(
-                    "overlap {overlap:.3}, of which {:.3} is left {:.2} m aside; the map keeps no moments",
-                    slide.share,
-                    settings.slide * resolution_m
-                ),
-            };
-            (Verdict::Accepted, reason)
-        };
-        Alignment {
-            map_from_sensor: self.map_from_sensor,
-            verdict,
-            reason,
-            level_overlaps: self.level_overlaps,
-            inliers: self.surfaces.inliers,
-            fitness: self.surfaces.fitness,
-            information,
-            undetermined,
-            refined_by_m: self.refined_by_m,
-            agreement: None,
-            rivals: Vec::new(),
-            contradicted_both_ways: false,
-            wants_more_starts: false,
-            iterations: self.iterations,
-            lookups: self.lookups,
-        }
-    }
-}
-
-impl Alignment {
-    /// An alignment at a pose that was not searched for: the caller's word, or the first scan of a map.
+    /// An alignment at a pose that was not searched for: of the first scan of a map.
     pub fn trusted(map_from_sensor: Pose, levels: u32, points: &[Point]) -> Self {
         Self {
             map_from_sensor,
@@ -218,7 +121,6 @@ impl Alignment {
             fitness: 0.0,
             information: PoseInformation::none(points),
             undetermined: Vec::new(),
-            refined_by_m: 0.0,
             agreement: None,
             rivals: Vec::new(),
             contradicted_both_ways: false,
@@ -226,10 +128,5 @@ impl Alignment {
             iterations: 0,
             lookups: 0,
         }
-    }
-
-    /// This alignment, accepted because the caller says so.
-    pub fn accepted_by_caller(self) -> Self {
-        self.but(Verdict::Accepted, "the caller's word".into())
     }
 }

@@ -14,7 +14,7 @@ use super::scan::Scan;
 use super::sightings::Sightings;
 use super::stationary::StationarySettings;
 use super::viewpoints::{SeenScan, ViewpointSettings};
-use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
+use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at};
 use crate::geometry::{Point, Pose, Twist, pose_difference};
 use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 use crate::util::StopSignal;
@@ -145,7 +145,7 @@ impl<'a> ScanMapper<'a> {
     ) -> Alignment {
         let (points, settings) = (scan.points_at(velocity), &self.settings.alignment);
         match scan.at_guess {
-            true => evaluate_at_until(self.map, &points, guess, settings, stop).accepted_by_caller(),
+            true => evaluate_at(self.map, &points, guess, settings, stop),
             false => align_until(self.map, &points, &self.prior(scan, *guess), settings, stop),
         }
     }

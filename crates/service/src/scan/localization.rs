@@ -12,11 +12,11 @@ use crate::request::{MapVersion, PointCloud};
 use crate::resources::{Reservation, ResourceBudget};
 use crate::settings::ServiceSettings;
 use crate::work::check_not_stopped;
-use mrol_map::align::Verdict;
 use mrol_map::align::localize::{
     Candidate, GravityError, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
     LocalizationSettings, Supervision, localize_supervised,
 };
+use mrol_map::align::{RayAgreement, Rival, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapName;
 use mrol_map::scan::{PointFilter, SkippedPoints};
@@ -43,12 +43,14 @@ pub struct LocalizationRequest {
 /// The places that a scan fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalizationAnswer {
-    /// Accepted only where the best candidate fits and no other place is as good.
+    /// Accepted only where rays believe the first candidate and no other place is as likely.
     pub verdict: Verdict,
     /// Why, in a sentence with the figures.
     pub reason: String,
-    /// Distinct places, best first.
+    /// Distinct places, best first, as [`Localization::candidates`].
     pub candidates: Vec<CandidateAnswer>,
+    /// Poses that the scan may have been taken at as well as at the first candidate: why it is ambiguous.
+    pub rivals: Vec<Rival>,
     /// Every pose was considered: the way down was known, and the search ended by itself.
     pub exhaustive: bool,
     /// The search was stopped before its end.
@@ -70,12 +72,8 @@ pub struct CandidateAnswer {
     pub overlap: f64,
     /// Fraction of a sample of the points that lie on the map's surfaces.
     pub inliers: f64,
-    /// Fraction of the rays that pass through what the map holds.
-    pub blocked: f64,
-    /// Overlap times the fraction of the rays that are not blocked: what candidates are ranked by.
-    pub fit: f64,
-    /// The candidate's fit less that of the best other candidate; none where there is no other.
-    pub margin: Option<f64>,
+    /// How rays agree there; none where the search was stopped before they were asked.
+    pub rays: Option<RayAgreement>,
 }
 
 impl LocalizationAnswer {
@@ -90,6 +88,7 @@ impl LocalizationAnswer {
             verdict: found.verdict,
             reason: skipped.explain(found.verdict == Verdict::Accepted, &found.reason),
             candidates: found.candidates.iter().map(CandidateAnswer::from).collect(),
+            rivals: found.rivals,
             exhaustive: found.exhaustive,
             cut_short: found.cut_short,
             search_time,
@@ -107,12 +106,10 @@ impl LocalizationAnswer {
 impl From<&Candidate> for CandidateAnswer {
     fn from(candidate: &Candidate) -> Self {
         Self {
-            map_from_sensor: candidate.map_from_sensor(),
-            overlap: candidate.alignment.overlap(),
-            inliers: candidate.alignment.inliers,
-            blocked: candidate.blocked,
-            fit: candidate.fit(),
-            margin: candidate.margin,
+            map_from_sensor: candidate.map_from_sensor,
+            overlap: candidate.overlap,
+            inliers: candidate.inliers,
+            rays: candidate.agreement,
         }
     }
 }

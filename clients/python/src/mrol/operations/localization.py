@@ -13,6 +13,7 @@ from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
 from .handle import MapHandle
 from .occupancy import POINTS
+from .scans import RayAgreement, Rival, rays_in, rivals_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +25,8 @@ class Candidate:
     """The share of its points in occupied voxels of level 0."""
     inliers: float
     """The share of a sample of its points that lie on the map's surfaces."""
-    blocked: float
-    """The share of its rays that the map blocks before their points."""
-    fit: float
-    """`overlap * (1 - blocked)`, by which candidates are ranked."""
-    margin: float | None
-    """The fit less that of the best other candidate; None where there is no other."""
+    rays: RayAgreement | None
+    """How rays agree there. None where the search was stopped before they were asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +38,10 @@ class Localization(Versioned):
     reason: str
     """Why, in a sentence."""
     candidates: tuple[Candidate, ...]
-    """The places found, the best first."""
+    """The places found, the best first: that of the verdict, then those of which rays tell enough, by the share that agree, then
+    the others, by overlap."""
+    rivals: tuple[Rival, ...]
+    """Poses that it may have been taken at as well as at the first candidate: why it is ambiguous."""
     exhaustive: bool
     """Whether all of the map, or of the search box, was searched."""
     cut_short: bool
@@ -97,6 +97,7 @@ class LocalizationOperations(MapHandle):
             verdict=fields.text("verdict"),
             reason=fields.text("reason"),
             candidates=tuple(_candidate(of) for of in fields.objects("candidates")),
+            rivals=rivals_in(fields),
             exhaustive=fields.flag("exhaustive"),
             cut_short=fields.flag("cut_short"),
             search_ms=fields.number("search_ms"),
@@ -113,7 +114,5 @@ def _candidate(fields: Fields) -> Candidate:
         map_from_sensor=pose_in(fields, "map_from_sensor"),
         overlap=fields.number("overlap"),
         inliers=fields.number("inliers"),
-        blocked=fields.number("blocked"),
-        fit=fields.number("fit"),
-        margin=fields.optional("margin", fields.number),
+        rays=fields.optional("rays", lambda name: rays_in(fields.object(name))),
     )

@@ -314,8 +314,8 @@ def answer_in(fields: Fields, shape: tuple[int, ...], robot: str, session: str, 
         fitness=fields.number("fitness"),
         information=fields.optional("information", lambda name: fields.numbers(name, (6, 6))),
         undetermined=tuple(_open_direction(of) for of in fields.objects("undetermined")),
-        rays=fields.optional("rays", lambda name: _rays(fields.object(name))),
-        rivals=tuple(Rival(pose_in(of, "map_from_sensor"), _rays(of.object("rays"))) for of in fields.objects("rivals")),
+        rays=fields.optional("rays", lambda name: rays_in(fields.object(name))),
+        rivals=rivals_in(fields),
         iterations=fields.whole("iterations"),
         align_ms=fields.number("align_ms"),
         new_voxels=fields.whole("new_voxels"),
@@ -331,7 +331,13 @@ def answer_in(fields: Fields, shape: tuple[int, ...], robot: str, session: str, 
     )
 
 
-def _rays(fields: Fields) -> RayAgreement:
+def rivals_in(fields: Fields) -> tuple[Rival, ...]:
+    """The rivals of an answer."""
+    return tuple(Rival(pose_in(of, "map_from_sensor"), rays_in(of.object("rays"))) for of in fields.objects("rivals"))
+
+
+def rays_in(fields: Fields) -> RayAgreement:
+    """The agreement of rays that fields tell."""
     of_scan, of_map = (fields.object(side) for side in ("of_scan", "of_map"))
     return RayAgreement(_counts(of_scan), _counts(of_map))
 

@@ -228,9 +228,9 @@ fn unjudged(method: Method, lookup: Lookup) -> AlignmentSettings {
         lookup,
         overlap_min: 0.0,
         undetermined_std: f64::MAX,
-        refinement_max_correction: f64::MAX,
         multi_start: MultiStartSettings {
             fitness_below: 0.0,
+            correction_above: f64::MAX,
             std_above: f64::MAX,
             motion_above: f64::MAX,
             motion_above_deg: f64::MAX,

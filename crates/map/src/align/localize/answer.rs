@@ -1,18 +1,24 @@
 //! Results of global localization.
 
-use crate::align::verdict::{Alignment, Verdict};
+use crate::align::agreement::{RayAgreement, Rival};
+use crate::align::verdict::Verdict;
 use crate::geometry::Pose;
 use crate::map::ContentVersion;
 
 /// Result of a global localization: where a scan may have been taken, and whether to believe it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Localization {
-    /// Verdict on the best candidate: accepted only where it fits and no other place is as good.
+    /// Verdict on the first candidate: accepted only where rays believe it and no other place is as likely.
     pub verdict: Verdict,
     /// Reason for the verdict, a sentence with the figures.
     pub reason: String,
-    /// Distinct places that fit, best first; empty where none does.
+    /// Distinct places that fit, best first; empty where none does. First comes the one that the verdict is on, then
+    /// those where the scan and earlier scans saw enough of each other, by [the smaller share of rays that
+    /// agree](RayAgreement::worse), then the others, by overlap.
     pub candidates: Vec<Candidate>,
+    /// Poses that the scan may have been taken at as well as at the first candidate: why it is
+    /// [ambiguous](Verdict::Ambiguous).
+    pub rivals: Vec<Rival>,
     /// True when every pose of the search box was considered: the direction of gravity was given, and the search ended
     /// by itself.
     pub exhaustive: bool,
@@ -25,30 +31,16 @@ pub struct Localization {
 }
 
 /// A place that a scan fits.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// Alignment of the scan at this place, after refinement.
-    pub alignment: Alignment,
-    /// Fraction of the search's points that fall on the dilated map at this place.
-    pub search_overlap: f64,
-    /// Fraction of the scan's rays that pass through occupied voxels of the map before they reach their points.
-    pub blocked: f64,
-    /// Difference of the candidate's [`fit`](Self::fit) and that of the best other candidate; none where there is no
-    /// other.
-    pub margin: Option<f64>,
-}
-
-impl Candidate {
-    /// The candidate's pose, map_from_sensor.
-    pub fn map_from_sensor(&self) -> Pose {
-        self.alignment.map_from_sensor
-    }
-
-    /// Score that candidates are ranked by: the overlap with the map times the share of the rays that are not blocked.
-    /// Overlap alone prefers clutter.
-    pub fn fit(&self) -> f64 {
-        self.alignment.overlap() * (1.0 - self.blocked)
-    }
+    /// Where the sensor was, after refinement: map_from_sensor.
+    pub map_from_sensor: Pose,
+    /// Fraction of the points in occupied voxels of level 0.
+    pub overlap: f64,
+    /// Fraction of a volumetric sample of the points that lie on the map's surfaces.
+    pub inliers: f64,
+    /// How rays agree there; none where the search was stopped before they were asked.
+    pub agreement: Option<RayAgreement>,
 }
 
 /// Progress of a search.
@@ -58,7 +50,7 @@ pub struct SearchProgress {
     pub cells: u64,
     /// Number of cells that wait to be divided.
     pub waiting: usize,
-    /// The best [`Candidate::search_overlap`] so far.
+    /// The largest fraction so far of the search's points that fall on the dilated map.
     pub best_overlap: f64,
 }
 
@@ -109,6 +101,7 @@ impl Localization {
             verdict: Verdict::Ambiguous,
             reason: "the search was cut short before it began".into(),
             candidates: Vec::new(),
+            rivals: Vec::new(),
             exhaustive: false,
             cut_short: true,
             cells: 0,

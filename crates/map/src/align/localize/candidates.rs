@@ -1,15 +1,14 @@
-//! Candidates: the places that a search found, refined by alignment and ranked.
+//! Candidates: the places that a search found, refined by alignment and ranked by rays.
 
 use super::answer::Candidate;
 use super::basins::Basin;
-use super::dilated::DilatedLevels;
-use super::sample::SearchSample;
 use super::settings::LocalizationSettings;
-use super::visibility::blocked_share;
 use crate::align::agreement::Rays;
+use crate::align::ascent::Ascent;
+use crate::align::ends::{End, Ends};
+use crate::align::fit::Fit;
 use crate::align::rivals::Contest;
 use crate::align::sampled_scan::SampledScan;
-use crate::align::sequential::evaluate_at;
 use crate::align::settings::AlignmentSettings;
 use crate::align::stages::{climb, finish};
 use crate::align::verdict::Alignment;
@@ -25,110 +24,86 @@ const THINNED: usize = 3000;
 pub(super) struct Refinement<'a> {
     pub(super) map: &'a MultiResolutionMap,
     pub(super) points: &'a [Point],
-    pub(super) levels: &'a DilatedLevels,
-    pub(super) sample: &'a SearchSample,
+    /// Side of the finest voxels of the search, meters.
+    pub(super) side_m: f64,
     pub(super) settings: &'a LocalizationSettings,
     pub(super) alignment: &'a AlignmentSettings,
     pub(super) stop: StopSignal<'a>,
 }
 
+/// The candidates of a search, the best first, and the alignment there with its verdict.
+pub(super) struct Judged {
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) best: Alignment,
+}
+
 impl Refinement<'_> {
-    /// The distinct candidates that the places lead to, best first. All are refined with some of the scan's points,
-    /// then the best `wish` with all of them. Once stopped, the remaining places are judged where they are, with a few
-    /// thousand look-ups each.
-    pub(super) fn candidates(&self, places: &[Basin], wish: usize) -> Vec<Candidate> {
-        let thinned = volumetric_sample_until(self.points, THINNED, self.alignment.seed, self.stop).points;
-        let mut candidates: Vec<Candidate> =
-            places.iter().map(|place| self.first_at(&thinned, place)).collect();
-        rank(&mut candidates);
-        let mut candidates = self.distinct(candidates);
-        for candidate in candidates.iter_mut().take(wish) {
-            let refined = self.at(self.points, &candidate.map_from_sensor(), candidate.search_overlap);
-            // A refinement that was stopped half-way is meaningless.
-            if self.stop.is_stopped() {
-                break;
-            }
-            *candidate = refined;
+    /// The distinct candidates that the places lead to; none without a place. All are refined with some of the scan's
+    /// points and looked at by rays, then the best `wish` refined with all points. Once stopped, the remaining places
+    /// are taken where they are, with a few thousand look-ups each, and ranked by overlap.
+    pub(super) fn judged(&self, places: &[Basin], wish: usize) -> Option<Judged> {
+        if places.is_empty() {
+            return None;
         }
-        rank(&mut candidates);
-        self.distinct(candidates)
+        let (map, settings) = (self.map, self.alignment);
+        let thinned = volumetric_sample_until(self.points, THINNED, settings.seed, self.stop).points;
+        let (scan, thinned) = (self.sampled(self.points, self.stop), self.sampled(&thinned, self.stop));
+        let rays = Rays::of(map, &scan);
+        let contest = Contest { map, scan: &scan, rays: &rays, settings };
+        let rank = |fits: Vec<Fit>| contest.rank(fits, |a, b| self.is_same_place(a, b));
+
+        let fits = places.iter().map(|place| self.first_at(&thinned, &place.map_from_sensor)).collect();
+        let ranked = rank(fits).all.into_iter().map(|end| end.fit).enumerate();
+        let refined = ranked.map(|(k, fit)| match k < wish {
+            true => self.refined(&scan, &fit.map_from_sensor).unwrap_or(fit),
+            false => fit,
+        });
+        let ends = rank(refined.collect());
+        let best = contest.decide_among(&ends);
+        Some(Judged { candidates: candidates(&ends, &best.map_from_sensor), best })
     }
 
-    /// The candidate that a place leads to, refined with the thinned points; the unrefined place once stopped.
-    fn first_at(&self, thinned: &[Point], place: &Basin) -> Candidate {
-        let (pose, search_overlap) = (place.map_from_sensor, self.share(place.score));
-        if !self.stop.is_stopped() {
-            let candidate = self.at(thinned, &pose, search_overlap);
-            if !self.stop.is_stopped() {
-                return candidate;
-            }
+    fn sampled<'a>(&self, points: &'a [Point], stop: StopSignal<'a>) -> SampledScan<'a> {
+        SampledScan::new(points, self.map.lattice(), self.alignment, stop)
+    }
+
+    /// How the thinned points fit where they lead from a place; at the place itself once stopped.
+    fn first_at(&self, thinned: &SampledScan<'_>, place: &Pose) -> Fit {
+        self.refined(thinned, place).unwrap_or_else(|| {
+            let unstopped = self.sampled(thinned.points, StopSignal::NEVER);
+            Fit::of(self.map, &unstopped, Ascent::from(*place), 0.0, self.alignment)
+        })
+    }
+
+    /// Aligns a scan from a place; none once stopped, since half of it is meaningless. There is no restart from other
+    /// guesses: the search has covered them.
+    fn refined(&self, scan: &SampledScan<'_>, guess: &Pose) -> Option<Fit> {
+        if self.stop.is_stopped() {
+            return None;
         }
-        let alignment = evaluate_at(self.map, thinned, &pose, self.alignment);
-        let blocked = blocked_share(self.levels, self.sample, &pose, StopSignal::NEVER);
-        Candidate { alignment, search_overlap, blocked, margin: None }
+        let ascent = climb(self.map, scan, *guess, self.map.settings().levels - 1, self.alignment);
+        let fit = finish(self.map, scan, ascent, self.alignment);
+        (!self.stop.is_stopped()).then_some(fit)
     }
 
-    fn share(&self, score: u16) -> f64 {
-        f64::from(score) / self.sample.points.len().max(1) as f64
-    }
-
-    fn at(&self, points: &[Point], guess: &Pose, search_overlap: f64) -> Candidate {
-        let alignment = self.refined(points, guess);
-        let blocked = blocked_share(self.levels, self.sample, &alignment.map_from_sensor, self.stop);
-        Candidate { alignment, search_overlap, blocked, margin: None }
-    }
-
-    /// Aligns `points` from a place. There is no restart from other guesses: the search has covered them.
-    fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
-        let scan = SampledScan::new(points, self.map.lattice(), self.alignment, self.stop);
-        let ascent = climb(self.map, &scan, *guess, self.map.settings().levels - 1, self.alignment);
-        finish(self.map, &scan, ascent, self.alignment)
-    }
-
-    /// Puts the candidate first that rays contradict least, with the verdict on it.
-    pub(super) fn ask_rays(&self, candidates: &mut [Candidate]) {
-        if candidates.is_empty() {
-            return;
-        }
-        let scan = SampledScan::new(self.points, self.map.lattice(), self.alignment, self.stop);
-        let rays = Rays::of(self.map, &scan);
-        let contest = Contest { map: self.map, scan: &scan, rays: &rays, settings: self.alignment };
-        let places = candidates.iter().map(|candidate| candidate.alignment.clone()).collect();
-        let alignment = contest.decide_among(places);
-        let is_it = |candidate: &Candidate| candidate.map_from_sensor() == alignment.map_from_sensor;
-        let best = candidates.iter().position(is_it).unwrap_or(0);
-        candidates[best].alignment = alignment;
-        candidates[..=best].rotate_right(1);
-    }
-
-    /// Removes candidates that are the same place as a better one, which takes over their search score.
-    fn distinct(&self, ranked: Vec<Candidate>) -> Vec<Candidate> {
-        let radius_m = self.settings.basin_voxels * self.levels.finest().resolution_m();
-        let mut distinct: Vec<Candidate> = Vec::with_capacity(ranked.len());
-        for candidate in ranked {
-            let same = distinct.iter_mut().find(|better| {
-                let (meters, degrees) =
-                    pose_difference(&better.map_from_sensor(), &candidate.map_from_sensor());
-                meters < radius_m && degrees < self.settings.basin_deg
-            });
-            match same {
-                Some(better) => better.search_overlap = better.search_overlap.max(candidate.search_overlap),
-                None => distinct.push(candidate),
-            }
-        }
-        distinct
+    /// True of poses that the search takes as one place.
+    fn is_same_place(&self, a: &Pose, b: &Pose) -> bool {
+        let (meters, degrees) = pose_difference(a, b);
+        meters < self.settings.basin_voxels * self.side_m && degrees < self.settings.basin_deg
     }
 }
 
-/// Sorts candidates by descending fit; the sort is stable.
-fn rank(candidates: &mut [Candidate]) {
-    candidates.sort_by(|a, b| b.fit().total_cmp(&a.fit()));
-}
-
-pub(super) fn set_margins(ranked: &mut [Candidate]) {
-    let fits: Vec<f64> = ranked.iter().map(Candidate::fit).collect();
-    for (place, candidate) in ranked.iter_mut().enumerate() {
-        let other = if place == 0 { fits.get(1) } else { fits.first() };
-        candidate.margin = other.map(|other| fits[place] - other);
+/// The candidates at the ends, in their order, but `best` first.
+fn candidates(ends: &Ends<'_>, best: &Pose) -> Vec<Candidate> {
+    let of_end = |end: &End| Candidate {
+        map_from_sensor: end.fit.map_from_sensor,
+        overlap: end.fit.overlap(),
+        inliers: end.fit.inliers,
+        agreement: Some(end.agreement).filter(|agreement| agreement.is_asked()),
+    };
+    let mut candidates: Vec<Candidate> = ends.all.iter().map(of_end).collect();
+    if let Some(place) = candidates.iter().position(|candidate| candidate.map_from_sensor == *best) {
+        candidates[..=place].rotate_right(1);
     }
+    candidates
 }

@@ -137,31 +137,14 @@ impl DistanceField {
     }
 
     /// The distance at `place`, in voxels from the grid's corner; [`FAR`] outside of the grid.
-    #[inline(always)]
+    #[cfg(test)]
     pub(super) fn at(&self, place: [f32; 3]) -> u8 {
         let [x, y, z] = std::array::from_fn(|axis| self.clamped(place[axis], axis));
         self.distances[(z * self.size[1] + y) * self.size[0] + x]
     }
 
-    /// Where the ray from `origin` along `toward` (voxels from the grid's corner) enters and leaves the grid, as
-    /// multiples of `toward`, not negative. None where the ray misses the grid or a number is NaN.
-    pub(super) fn crossed_by(&self, origin: [f32; 3], toward: [f32; 3]) -> Option<(f32, f32)> {
-        let (mut enters, mut leaves) = (0.0f32, f32::INFINITY);
-        for axis in 0..3 {
-            let size = self.size[axis] as f32;
-            if toward[axis] == 0.0 {
-                (0.0..=size).contains(&origin[axis]).then_some(())?;
-                continue;
-            }
-            let at = |border: f32| (border - origin[axis]) / toward[axis];
-            enters = enters.max(at(0.0).min(at(size)));
-            leaves = leaves.min(at(0.0).max(at(size)));
-        }
-        (enters <= leaves && enters.is_finite()).then_some((enters, leaves))
-    }
-
     /// Row of the grid that a coordinate falls in, clamped to the grid.
-    #[inline(always)]
+    #[cfg(test)]
     fn clamped(&self, coordinate: f32, axis: usize) -> usize {
         (coordinate.max(0.0) as usize).min(self.size[axis] - 1)
     }

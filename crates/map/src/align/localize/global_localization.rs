@@ -3,7 +3,7 @@
 use super::answer::{Localization, LocalizationError};
 use super::basins::Basins;
 use super::bound::Bounds;
-use super::candidates::{Refinement, set_margins};
+use super::candidates::Refinement;
 use super::dilated::DilatedLevels;
 use super::orientation::Orientations;
 use super::query::LocalizationQuery;
@@ -102,20 +102,19 @@ fn search_and_refine(
         Basins::new(settings.basin_voxels * side_m, settings.basin_deg.to_radians(), settings.basins_max);
     let found = Search::new(&bounds, settings, basins, supervision).run();
 
-    // 5) Refine the places found by alignment, and rank them.
-    let refinement = Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, stop };
-    let mut candidates = refinement.candidates(&found.places, query.candidates);
-
-    // 6) Say which of them rays believe, and whether it stands out.
-    refinement.ask_rays(&mut candidates);
-    set_margins(&mut candidates);
+    // 5) Refine the places found by alignment, rank them by rays, and say whether the best is to be believed.
+    let judged =
+        Refinement { map, points, side_m, settings, alignment, stop }.judged(&found.places, query.candidates);
     let cut_short = !found.complete || stop.is_stopped();
-    let (verdict, reason) = verdict_on(candidates.first(), cut_short, settings);
+    let (verdict, reason) = verdict_on(judged.as_ref().map(|judged| &judged.best), cut_short, settings);
+    let (mut candidates, rivals) =
+        judged.map(|judged| (judged.candidates, judged.best.rivals)).unwrap_or_default();
     candidates.truncate(query.candidates);
     Ok(Localization {
         verdict,
         reason,
         candidates,
+        rivals,
         exhaustive: !cut_short && orientations.all,
         cut_short,
         cells: found.cells,

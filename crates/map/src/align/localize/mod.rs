@@ -9,7 +9,7 @@
 //!
 //! Reading order: `global_localization` has the composing function; `distance_field` is a dilated level, `dilated` the
 //! levels of one revision, `orientation` and `rotation` the rotations, `bound` the bounds, `search` the search;
-//! `candidates`, `visibility` and `verdict` judge the places that it finds.
+//! `candidates` and `verdict` judge the places that it finds.
 
 mod answer;
 mod basins;
@@ -30,7 +30,6 @@ mod supervision;
 #[cfg(test)]
 mod tests;
 mod verdict;
-mod visibility;
 
 pub use super::gravity::{Gravity, GravityError, MAP_DOWN};
 pub use answer::{Candidate, Localization, LocalizationError, SearchProgress};

@@ -92,7 +92,7 @@ fn an_endless_box_and_a_far_return_are_searched_as_far_as_the_scan_sees() {
         let found = seen.found.unwrap();
         assert!(!found.cut_short, "{far}: {}", found.reason);
         assert!(found.cells < 5_000_000, "{far}: {} cells", found.cells);
-        let at = found.candidates[0].map_from_sensor();
+        let at = found.candidates[0].map_from_sensor;
         assert!(at.translation.vector.norm() < 0.05, "{far}: {at:?}");
         assert!(seen.cells_per_look <= 8 * 64, "{far}: {} cells between two looks", seen.cells_per_look);
     }

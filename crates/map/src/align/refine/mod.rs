@@ -12,4 +12,4 @@ mod known_moments;
 mod refinement;
 
 pub(super) use gaussians::VoxelGaussians;
-pub(super) use refinement::{SurfaceFit, refine, surface_fit};
+pub(super) use refinement::{refine, surface_fit};

@@ -126,7 +126,7 @@ fn down_of(map_from_sensor: &Pose) -> Option<Gravity> {
 /// The place that a search found, if it is to be believed.
 fn place_of(found: &Localization) -> Result<Pose, String> {
     match found.candidates.first() {
-        Some(best) if found.verdict == Verdict::Accepted => Ok(best.map_from_sensor()),
+        Some(best) if found.verdict == Verdict::Accepted => Ok(best.map_from_sensor),
         _ => Err(format!("{}: {}", found.verdict.as_str(), found.reason)),
     }
 }
