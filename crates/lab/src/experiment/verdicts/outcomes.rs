@@ -40,15 +40,28 @@ impl Outcomes {
         truth: Option<&Pose>,
         resolution_m: f64,
     ) {
+        let Alignment { map_from_sensor, verdict, reason, .. } = alignment;
+        self.add_pose(*took, (map_from_sensor, *verdict, reason), truth, resolution_m);
+    }
+
+    /// Adds a pose that was found, with the verdict on it and the reason.
+    pub(super) fn add_pose(
+        &mut self,
+        took: Duration,
+        (found, verdict, reason): (&Pose, Verdict, &str),
+        truth: Option<&Pose>,
+        resolution_m: f64,
+    ) {
         self.took_ms.push(took.as_secs_f64() * 1e3);
-        let error = truth.map(|truth| pose_difference(&alignment.map_from_sensor, truth));
-        let is_right = truth.is_some_and(|truth| is_right(&alignment.map_from_sensor, truth, resolution_m));
-        match (alignment.verdict, is_right) {
+        let is_right = truth.is_some_and(|truth| is_right(found, truth, resolution_m));
+        match (verdict, is_right) {
             (Verdict::Accepted, true) => self.right += 1,
-            (Verdict::Accepted, false) => self.wrong.push((error, alignment.reason.clone())),
+            (Verdict::Accepted, false) => {
+                self.wrong.push((truth.map(|truth| pose_difference(found, truth)), reason.to_owned()));
+            }
             (verdict, true) => {
                 *self.refused.entry(verdict.as_str()).or_default() += 1;
-                self.refusals.push(alignment.reason.clone());
+                self.refusals.push(reason.to_owned());
             }
             (_, false) => self.lost += 1,
         }

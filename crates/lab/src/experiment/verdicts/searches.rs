@@ -51,10 +51,10 @@ impl Trials<'_> {
             let found = localize(&self.map, points, &query, &settings, &AlignmentSettings::default())?;
             let took = start.elapsed();
             searches.cells.push(found.cells);
-            match found.candidates.into_iter().next() {
+            match found.candidates.first() {
                 Some(best) => {
-                    let alignment = best.alignment.but(found.verdict, found.reason);
-                    searches.outcomes.add(&(alignment, took), Some(truth), self.resolution_m);
+                    let told = (&best.map_from_sensor, found.verdict, &*found.reason);
+                    searches.outcomes.add_pose(took, told, Some(truth), self.resolution_m);
                 }
                 None => searches.outcomes.add_nothing(took),
             }
