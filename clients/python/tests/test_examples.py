@@ -62,4 +62,3 @@ def test_the_package_tells_how_to_start(client: mrol.Client, hall: mrol.Map) -> 
     assert "mrol serve" in said()
     assert "mrol.connect(" in said()
     assert f"{hall.name}: revision 2, 2 scans" in said(client.address)
-    assert "cannot connect" in said("127.0.0.1:1")

@@ -32,6 +32,7 @@ from .errors import (
     TransportError,
     Unauthenticated,
     Unavailable,
+    WrongPort,
 )
 from .map import Map
 from .operations.blocks import DistanceField, VoxelBlocks
@@ -151,6 +152,7 @@ __all__ = [
     "WatchedState",
     "WatchedUndo",
     "WholeGrid",
+    "WrongPort",
     "connect",
     "errors",
 ]

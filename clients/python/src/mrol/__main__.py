@@ -1,21 +1,23 @@
 """`python -m mrol`: how to start."""
 
 import argparse
+import sys
 
-from . import MrolError, __version__, connect
+from . import ArgumentError, MrolError, __version__, connect
 
 START = """\
 mrol {version}: the 3-D map of a robot fleet, from Python.
 
 Start a server, in another terminal:
 
-    mrol serve                  HTTP on localhost:7333; `mrol demo` serves a map to ask about as well
+    mrol serve                  HTTP on localhost:7333 (gRPC, which this package does not speak, on 7334);
+                                `mrol demo` serves a map to ask about as well
 
 Then:
 
     import mrol, numpy as np
 
-    m = mrol.connect("localhost:7333").map("floor1", resolution=0.05)
+    m = mrol.connect("localhost:7333").map("first-steps", resolution=0.05)
     m.insert(np.random.rand(1000, 3), align=False)
     print(m.query([[0.5, 0.5, 0.5], [9, 9, 9]]).occupied)
 
@@ -27,7 +29,7 @@ help(mrol.connect) tells of keys, TLS and time-outs, help(mrol.Map) all that can
 
 
 def main() -> int:
-    """Prints how to start, or what maps a server has."""
+    """Prints how to start, or what maps a server has; 1 where it cannot be asked, 2 for what is no address."""
     parser = argparse.ArgumentParser(prog="python -m mrol", description="Prints how to start, or the maps of a server.")
     parser.add_argument("address", nargs="?", help="host:port, https://host:port or unix:/path")
     address = parser.parse_args().address
@@ -39,8 +41,8 @@ def main() -> int:
             for of in client.maps().maps:
                 print(f"{of.name}: revision {of.revision}, {of.scans} scans, {of.voxels[0]} voxels of {of.resolution_m:g} m")
     except MrolError as error:
-        print(f"error: {error}")
-        return 1
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, ArgumentError) else 1
     return 0
 
 

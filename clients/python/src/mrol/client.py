@@ -18,9 +18,10 @@ from ._transport.caller import Bounds, Caller
 from ._transport.deadline import seconds
 from ._transport.key import Key
 from ._transport.pool import Pool
+from ._transport.protocol import right_address
 from ._transport.request import JSON, Request, path_of, target_of
 from ._transport.tls import tls_context
-from .errors import ArgumentError, ConnectFailed, MrolError, ServerError, excerpt
+from .errors import ArgumentError, BadAnswer, ConnectFailed, ConnectionLost, MrolError, ServerError, WrongPort, excerpt
 from .map import Map
 from .operations.description import FilterSettings, MapInfo, map_info
 from .operations.handle import flag_of, word_of
@@ -32,6 +33,9 @@ PATIENCE_S = 15.0
 REQUEST_BYTES_MAX = 1 << 30
 ANSWER_BYTES_MAX = 1 << 30
 ROBOT = "python"
+
+LIVE = b"ok"
+"""What a server says of itself at `/livez`."""
 
 FIRST_PAUSE_S = 0.1
 TRY_MIN_S = 1.0
@@ -217,7 +221,8 @@ def connect(
 
     Files of keys and certificates are regular ones: pipes and devices are refused.
 
-    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate. No error shows a key of 8 characters or
+    Raises `ConnectFailed`, `BadAnswer` where no mrol server is there (`WrongPort` where it is gRPC that is spoken, or TLS without
+    https), and `ArgumentError` for what is no address, key or certificate. No error shows a key of 8 characters or
     more, also where a peer says it again; nor an address that is refused, nor a path that names nothing, since those may be a key
     in the wrong argument.
     """
@@ -256,15 +261,35 @@ def _wait_for(caller: Caller, wait_s: float) -> None:
         left_s = end - time.monotonic()
         of_try = caller if wait_s == 0 else caller.with_timeout(min(caller.bounds.timeout_s, max(left_s, TRY_MIN_S)))
         try:
-            of_try.call(Request("GET", "/livez"))
-        except (MrolError, ConnectionError) as error:
+            _greet(of_try)
+        except WrongPort:
+            # It will not become another.
+            raise
+        except MrolError as error:
             if time.monotonic() + FIRST_PAUSE_S > end:
-                if isinstance(error, ConnectFailed):
+                if isinstance(error, ConnectFailed) and "?" not in str(error):
                     raise ConnectFailed(f"{error}; is `mrol serve` running there?") from error
+                if isinstance(error, ConnectionLost):
+                    may_be = f"{caller.place.shown} may be no mrol server; {right_address(caller.place)}"
+                    raise ConnectionLost(f"{error}: {may_be}") from error
                 raise
         else:
             return
         time.sleep(FIRST_PAUSE_S)
+
+
+def _greet(caller: Caller) -> None:
+    """Makes sure that an mrol server is there: it says "ok"."""
+    try:
+        said = bytes(caller.call(Request("GET", "/livez")).body)
+        if said.strip() == LIVE:
+            return
+        wrong = f"it says {excerpt(said)} where that one says {excerpt(LIVE)}"
+    except WrongPort:
+        raise
+    except BadAnswer as error:
+        wrong = str(error)
+    raise BadAnswer(f"{caller.place.shown} is no mrol server: {wrong}; {right_address(caller.place)}")
 
 
 def _filter_json(filter: FilterSettings | str | None) -> dict[str, Any] | str | None:

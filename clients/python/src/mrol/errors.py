@@ -10,6 +10,7 @@ MrolError                 itself: a map file that changed, or could not be read,
     ConnectionLost        it broke before the answer was there (a ConnectionError)
     TimedOut              the call's own time was up (a TimeoutError)
   BadAnswer               what came is no answer of an mrol server
+    WrongPort             the address is one of gRPC, or of TLS without https://
 """
 
 import re
@@ -176,6 +177,10 @@ class TimedOut(TransportError, TimeoutError):
 
 class BadAnswer(MrolError):
     """What came is no answer of an mrol server, or not one that this version of the package understands."""
+
+
+class WrongPort(BadAnswer):
+    """The address is one of another protocol: the server's gRPC, or TLS where the address does not say https."""
 
 
 _BY_CODE: dict[str, type[ServerError]] = {

@@ -1,8 +1,8 @@
 """A server that answers what a test says, however wrong."""
 
 import socket
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from threading import Event, Thread
 
 Script = Callable[[socket.socket, Event], None]
@@ -81,3 +81,24 @@ def answer(body: bytes, *headers: bytes, status: bytes = b"200 OK") -> bytes:
     """A well-formed answer."""
     lines = [b"HTTP/1.1 " + status, b"content-length: %d" % len(body), *headers]
     return b"\r\n".join(lines) + b"\r\n\r\n" + body
+
+
+@contextmanager
+def answering_all(data: bytes) -> Iterator[str]:
+    """The address of a server that says the same to each connection, whatever it is asked, and hangs up."""
+
+    def accept() -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = listener.accept()
+                with client, suppress(OSError):
+                    client.recv(65_536)
+                    client.sendall(data)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        accepting = Thread(target=accept, daemon=True)
+        accepting.start()
+        yield f"127.0.0.1:{listener.getsockname()[1]}"
+        with suppress(OSError):
+            listener.shutdown(socket.SHUT_RDWR)
+    accepting.join()

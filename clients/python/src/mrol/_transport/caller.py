@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, excerpt, server_error
+from .address import Address
 from .attempts import Attempts
 from .connection import Connection
 from .deadline import Deadline, seconds
@@ -45,6 +46,11 @@ class Caller:
     def address(self) -> str:
         """The server's address."""
         return str(self._pool.address)
+
+    @property
+    def place(self) -> Address:
+        """Where the server is."""
+        return self._pool.address
 
     def close(self) -> None:
         """Closes the connections that are kept."""

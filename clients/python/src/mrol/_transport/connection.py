@@ -9,10 +9,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import BadAnswer, ConnectFailed, ConnectionLost, MrolError, TimedOut, excerpt
+from ..errors import BadAnswer, ConnectFailed, ConnectionLost, MrolError, TimedOut, WrongPort, excerpt
 from .address import Address
 from .deadline import Deadline
 from .key import Secret
+from .protocol import wrong_port
 from .request import Answer, Request
 from .response import Response
 from .stream import BoundedStream
@@ -22,6 +23,9 @@ HEADER_BYTES = 128 << 10
 
 PIECE_BYTES = 256 << 10
 """Bytes of a body of unknown length that are read at once."""
+
+NO_TLS = ("WRONG_VERSION_NUMBER", "HTTP_REQUEST", "RECORD_LAYER_FAILURE")
+"""What OpenSSL calls an answer that is none of TLS."""
 
 
 class Connection:
@@ -50,6 +54,11 @@ class Connection:
         # A client that is not closed by hand ends with the last map that uses it, without a word of an unclosed socket.
         if hasattr(self, "_socket"):
             self.close()
+
+    @property
+    def wrong_port(self) -> WrongPort | None:
+        """What is wrong with the address, where another protocol is spoken there."""
+        return wrong_port(self._stream.opening, self._address)
 
     @property
     def has_ended(self) -> bool:
@@ -158,7 +167,11 @@ class _Failures:
             return
         # Ctrl-C too leaves a connection in the middle of an answer.
         self._connection.close()
-        if isinstance(error, MrolError) or not isinstance(error, Exception):
+        if not isinstance(error, Exception):
+            return
+        if (wrong := self._connection.wrong_port) is not None:
+            raise wrong from None
+        if isinstance(error, MrolError):
             return
         if isinstance(error, TimeoutError):
             raise TimedOut(str(error)) from error
@@ -217,7 +230,10 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
         return sock if tls is None else tls.wrap_socket(sock, server_hostname=address.host)
     except (OSError, ValueError) as error:
         sock.close()
-        raise ConnectFailed(f"cannot connect to {address.shown} over TLS: {error}") from error
+        # Its first bytes are no TLS.
+        is_other = isinstance(error, ssl.SSLError) and error.reason in NO_TLS
+        hint = f"; it seems to speak no TLS: is it http://{address.authority}?" if is_other else ""
+        raise ConnectFailed(f"cannot connect to {address.shown} over TLS: {error}{hint}") from error
     except BaseException:
         sock.close()
         raise

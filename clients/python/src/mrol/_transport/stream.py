@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import BadAnswer
 from .deadline import Deadline
+from .protocol import OPENING_BYTES
 
 if TYPE_CHECKING:
     # Python has it from 3.12 on; who checks types knows it.
@@ -34,6 +35,8 @@ class BoundedStream:
         self._deadline: Deadline | None = None
         self._bytes_left: int | None = 0
         self.has_ended = False
+        self.opening = b""
+        """The first bytes that came over the connection, which tell what is spoken at the other end."""
 
     def begin(self, deadline: Deadline, bytes_max: int | None) -> None:
         """Sets the bounds of the next request and its answer; without `bytes_max` any number of bytes is read."""
@@ -100,6 +103,8 @@ class BoundedStream:
             raise self._deadline.passed() from error
         if count == 0:
             self.has_ended = True
+        elif len(self.opening) < OPENING_BYTES:
+            self.opening += bytes(memoryview(buffer)[: min(count, OPENING_BYTES - len(self.opening))])
         if self._bytes_left is not None:
             self._bytes_left -= count
             if self._bytes_left < 0:
