@@ -55,9 +55,9 @@ def test_contiguous_float32_is_not_copied(hall: mrol.Map, monkeypatch: pytest.Mo
     sent: list[int] = []
     call = mrol.Map._send_bytes  # noqa: SLF001
 
-    def spy(m: mrol.Map, segment: str, pieces: list[memoryview], parameters: Any) -> Any:
+    def spy(m: mrol.Map, segment: str, pieces: list[memoryview], *others: Any) -> Any:
         sent.extend(np.frombuffer(piece, np.uint8).__array_interface__["data"][0] for piece in pieces)
-        return call(m, segment, pieces, parameters)
+        return call(m, segment, pieces, *others)
 
     monkeypatch.setattr(mrol.Map, "_send_bytes", spy)
     hall.query(POINTS)
@@ -68,7 +68,6 @@ def test_contiguous_float32_is_not_copied(hall: mrol.Map, monkeypatch: pytest.Mo
 REFUSED: dict[str, Callable[[], Any]] = {
     "shape (3, 2)": lambda: np.zeros((3, 2)),
     "shape (2,)": lambda: [1, 2],
-    "shape (0,)": list,
     "shape ()": lambda: 7.0,
     "complex128": lambda: np.zeros((1, 3), complex),
     "bool": lambda: np.zeros((1, 3), bool),
@@ -113,10 +112,6 @@ def test_what_the_server_refuses_of_points_is_told_by_it(hall: mrol.Map) -> None
         ([[0, 0, 0], [np.nan, 0, 0]], "point_not_finite"),
         ([[0, 0, np.inf]], "point_not_finite"),
         ([[1e9, 0, 0]], "point_out_of_range"),
-        (np.zeros((0, 3)), "empty_batch"),
-        (np.zeros((2_000_001, 3), np.float32), "batch_too_large"),
-        (np.zeros((4_000_000, 3), np.float32), "body_too_large"),
-        (np.zeros((40_000_000, 3), np.float32), "body_too_large"),
     ):
         with pytest.raises(mrol.InvalidArgument) as refused:
             hall.query(points)

@@ -63,9 +63,11 @@ def refuse_masked(value: object, axes: int, argument: str, expected: str) -> Non
 def rows_of(value: ArrayLike, columns: int, argument: str, expected: str, bytes_max: int) -> tuple[F32, Shape]:
     """Numbers as rows of so many little-endian floats, and the shape in which the rows were given.
 
-    An array of shape (..., columns) is n rows, where n is the product of the other lengths.
+    An array of shape (..., columns) is n rows, where n is the product of the other lengths; one of shape (0,) is no rows.
     """
     array = as_numbers(value, argument, expected)
+    if array.shape == (0,):
+        array = array.reshape(0, columns)
     if array.ndim == 0 or array.shape[-1] != columns:
         raise ArgumentError(argument, f"shape {array.shape}", expected)
     return as_floats(array, argument, expected, bytes_max).reshape(-1, columns), array.shape[:-1]

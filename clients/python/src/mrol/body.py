@@ -86,7 +86,7 @@ def configurations_of(value: ConfigurationsLike, links: int, argument: str, byte
     """
     axis = "" if links == 1 else f"{links}, "
     expected = f"poses of shape (..., {axis}4, 4), (..., {axis}7) or (..., {axis}3)"
-    sevens = _sevens(value, argument, expected)
+    sevens = _sevens(value, links, argument, expected)
     lead = sevens.shape[:-1]
     if links != 1:
         if not lead or lead[-1] != links:
@@ -95,7 +95,7 @@ def configurations_of(value: ConfigurationsLike, links: int, argument: str, byte
     return as_floats(sevens, argument, expected, bytes_max).reshape(-1, 7), lead
 
 
-def _sevens(value: Any, argument: str, expected: str) -> NDArray[Any]:
+def _sevens(value: Any, links: int, argument: str, expected: str) -> NDArray[Any]:
     if isinstance(value, Pose):
         return np.array(value.seven())
     if isinstance(value, Sequence) and value and all(isinstance(pose, Pose) for pose in value):
@@ -103,6 +103,9 @@ def _sevens(value: Any, argument: str, expected: str) -> NDArray[Any]:
     array = as_numbers(value, argument, expected)
     if array.shape[-2:] == (4, 4):
         return sevens_of(array, argument)
+    if array.shape == (0,):
+        # An empty list.
+        return np.zeros((0, 7)) if links == 1 else np.zeros((0, links, 7))
     if array.ndim > 0 and array.shape[-1] == 7:
         return array
     if array.ndim > 0 and array.shape[-1] == 3:

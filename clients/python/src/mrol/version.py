@@ -1,6 +1,6 @@
 """Which state of which map an answer speaks of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ._fields import Fields, reading
 from ._transport.request import Answer
@@ -52,6 +52,22 @@ class Versioned:
     def map_uuid(self) -> str:
         """The map's uuid."""
         return self.version.map_uuid
+
+
+@dataclass(frozen=True, eq=False)
+class InParts(Versioned):
+    """What answers about any number of elements have.
+
+    More than a server takes at once are asked about in several requests. Where the map changes between them their answers are of
+    different revisions: `version` is that of the last one.
+    """
+
+    version_of_first: Version | None = field(default=None, kw_only=True, repr=False)
+
+    @property
+    def first_version(self) -> Version:
+        """The version of the first part: that of all, where the map did not change meanwhile."""
+        return self.version if self.version_of_first is None else self.version_of_first
 
 
 def whole_header(answer: Answer, name: str) -> int:

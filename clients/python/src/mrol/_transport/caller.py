@@ -56,12 +56,12 @@ class Caller:
         """Closes the connections that are kept."""
         self._pool.close()
 
-    def call(self, request: Request) -> Answer:
-        """The answer to a request, whole.
+    def call(self, request: Request, deadline: Deadline | None = None) -> Answer:
+        """The answer to a request, whole, within its own time or by a deadline.
 
         Raises `ServerError` for a refusal, and `TransportError` or `BadAnswer` where there is no answer.
         """
-        deadline = Deadline(self.bounds.timeout_s)
+        deadline = deadline or Deadline(self.bounds.timeout_s)
         attempts = Attempts(self.bounds.patience_s, deadline)
         may_renew = True
         while True:

@@ -7,18 +7,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import F32, Bools, counts_of, number_of, rows_of
+from .._arrays import F32, U32, Bools, counts_of, number_of, rows_of
 from .._question import I32, Arrays, Names, QuestionAnswer
 from ..body import Body, BodyLike, ConfigurationsLike, configurations_of
 from ..errors import ArgumentError, BadAnswer, excerpt
 from ..shapes import Box, OrientedBox, Shape, Sphere, shape_json
-from ..version import Version, Versioned
+from ..version import InParts, Version
 from .handle import MapHandle, asked, word_of
+from .parts import Part, beginning_of
 
 Told = Literal["colliding", "first_hit", "clearance"]
 Unknown = Literal["free", "occupied"]
 
 I64 = NDArray[np.int64]
+
+ONE: U32 = np.ones(1, "<u4")
+A_SPHERE: F32 = np.array([[0, 0, 0, 0.01]], "<f4")
+"""What the server is asked about where there is no sphere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +51,7 @@ class Clearances:
 
 
 @dataclass(frozen=True, eq=False)
-class Collisions(Versioned):
+class Collisions(InParts):
     """Which configurations meet an occupied voxel or a keep-out.
 
     `colliding` has the shape of the configurations, `count` says how many of them collide. `first_hits` and `clearances` are there
@@ -89,19 +94,26 @@ class CheckOperations(MapHandle):
         `clearance_max_m` (64 voxels at most). Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With
         `unknown="occupied"` voxels are met that no scan saw through.
 
+        More configurations than the server takes at once are asked about in several requests (see `query`).
+
         Raises `InvalidArgument` (`bad_check`, `batch_too_large`, `point_out_of_range`), naming which.
         """
-        arrays = Arrays()
         checked = Body.of(body)
-        rows, shape = configurations_of(configurations, len(checked.links), "configurations", self._request_bytes_max)
-        head = {
-            "body": checked.json(arrays, self._request_bytes_max),
-            "configurations": arrays.add(rows),
+        links = len(checked.links)
+        rows, shape = configurations_of(configurations, links, "configurations", self._request_bytes_max)
+        of_all = {
             **_check_of(answer, clearance_max_m),
             **obstacles_of(ignored, unknown),
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
-        return _collisions(self._ask("poses", head, arrays), answer, shape)
+        given = rows if len(rows) else stand_in_poses(links)
+
+        def ask(part: Part) -> Collisions:
+            arrays, of_part = Arrays(), given[part.of.start * links : part.of.stop * links]
+            head = {"body": checked.json(arrays, self._request_bytes_max), "configurations": arrays.add(of_part), **of_all}
+            return _collisions(self._ask("poses", head, arrays, part), answer, len(of_part) // links)
+
+        return self._in_parts(len(rows) // links, rows.nbytes, shape, ask)
 
     def check_spheres(
         self,
@@ -123,20 +135,47 @@ class CheckOperations(MapHandle):
         With `sizes` (shape (g,)) they are g groups of so many spheres each, and there is an answer for each group. The other
         arguments are those of `check_poses`.
         """
-        arrays = Arrays()
         rows, shape = rows_of(spheres, 4, "spheres", "spheres x y z r, shape (..., 4)", self._request_bytes_max)
-        head: dict[str, Any] = {"spheres": arrays.add(rows), "padding_m": number_of(padding_m, "padding_m")}
+        counts = np.ones(len(rows), np.dtype("<u4"))
         if sizes is not None:
             counts = counts_of(sizes, "sizes")
             if int(counts.sum(dtype=np.uint64)) != len(rows):
                 raise ArgumentError("sizes", f"a sum of {counts.sum(dtype=np.uint64)}", f"counts of all {len(rows)} spheres")
-            head["sizes"], shape = arrays.add(counts), counts.shape
-        head |= {
+            shape = counts.shape
+        of_all = {
+            "padding_m": number_of(padding_m, "padding_m"),
             **_check_of(answer, clearance_max_m),
             **obstacles_of(ignored, unknown),
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
-        return _collisions(self._ask("spheres", head, arrays), answer, shape)
+        given, sizes_given = (rows, counts) if len(counts) else (A_SPHERE, ONE)
+        ends = ends_of(sizes_given)
+
+        def ask(part: Part) -> Collisions:
+            arrays, of_part, count = Arrays(), given[ends[part.of.start] : ends[part.of.stop]], part.of.stop - part.of.start
+            sizes_of_part = sizes_given[part.of]
+            if not len(of_part):
+                # Groups of no sphere: one more, of one, since the server takes no question without a sphere.
+                of_part, sizes_of_part = A_SPHERE, np.concatenate([sizes_of_part, ONE])
+            head: dict[str, Any] = {"spheres": arrays.add(of_part), **of_all}
+            if sizes is not None:
+                head["sizes"] = arrays.add(sizes_of_part)
+            found = _collisions(self._ask("spheres", head, arrays, part), answer, len(sizes_of_part))
+            return found if len(sizes_of_part) == count else beginning_of(found, count)
+
+        return self._in_parts(len(counts), rows.nbytes + counts.nbytes, shape, ask)
+
+
+def stand_in_poses(count: int) -> F32:
+    """Poses that the server is asked about where there are none, x y z qx qy qz qw: it checks all else, and tells its version."""
+    poses = np.zeros((count, 7), np.dtype("<f4"))
+    poses[:, 6] = 1
+    return poses
+
+
+def ends_of(counts: U32) -> I64:
+    """Where groups of so many rows begin and end, of which one has its end where the next one begins."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
 def obstacles_of(ignored: Sequence[Shape], unknown: str) -> dict[str, Any]:
@@ -163,8 +202,7 @@ def _check_of(answer: str, clearance_max_m: float | None) -> dict[str, Any]:
     }
 
 
-def _collisions(answer: QuestionAnswer, told: str, shape: tuple[int, ...]) -> Collisions:
-    count = int(np.prod(shape, dtype=np.int64))
+def _collisions(answer: QuestionAnswer, told: str, count: int) -> Collisions:
     head = answer.head
     if head.whole("checked") != count:
         raise BadAnswer(f"{head.whole('checked')} configurations were checked, not {count}")
@@ -173,15 +211,13 @@ def _collisions(answer: QuestionAnswer, told: str, shape: tuple[int, ...]) -> Co
         links = answer.numbers("hit_links", count)
         parts = np.where(links < 0, -1, answer.numbers("hit_parts", count))
         hits = FirstHits(
-            links.reshape(shape),
-            parts.reshape(shape),
-            answer.voxels("hit_voxels", count).reshape(*shape, 3),
-            answer.names("hit_keep_outs", count).reshape(shape),
+            links,
+            parts,
+            answer.voxels("hit_voxels", count),
+            answer.names("hit_keep_outs", count),
         )
     elif told == "clearance":
-        clearances = Clearances(
-            answer.floats("clearances_m", count).reshape(shape), answer.numbers("nearest_links", count).reshape(shape)
-        )
+        clearances = Clearances(answer.floats("clearances_m", count), answer.numbers("nearest_links", count))
     colliding_count = head.whole("colliding_count")
-    colliding = answer.bits("colliding", count, colliding_count).reshape(shape)
+    colliding = answer.bits("colliding", count, colliding_count)
     return Collisions(Version.of(head), colliding, colliding_count, hits, clearances)

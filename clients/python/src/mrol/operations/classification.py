@@ -8,13 +8,14 @@ from numpy.typing import ArrayLike
 from .._arrays import Bools, rows_of
 from .._question import Arrays
 from ..errors import BadAnswer
-from ..version import Version, Versioned
+from ..version import InParts, Version
 from .handle import MapHandle, asked
-from .occupancy import POINTS
+from .occupancy import POINTS, STAND_IN
+from .parts import Part
 
 
 @dataclass(frozen=True, eq=False)
-class Classification(Versioned):
+class Classification(InParts):
     """What is known of each point. Arrays have the shape of the points without their last axis."""
 
     occupied: Bools
@@ -43,15 +44,21 @@ class ClassificationOperations(MapHandle):
         """Whether points are occupied, free or unknown, by voxels of a level.
 
         `points` has shape (..., 3), meters, in the map frame.
+        More than the server takes at once are asked about in several requests (see `query`).
 
         Raises `InvalidArgument` (`point_not_finite`, `point_out_of_range`).
         """
-        arrays = Arrays()
         rows, shape = rows_of(points, 3, "points", POINTS, self._request_bytes_max)
-        head = {"points": arrays.add(rows), **asked(level, ignore_keep_outs, min_revision, map_uuid)}
-        answer = self._ask("classification", head, arrays)
-        count = len(rows)
-        if answer.head.whole("points") != count:
-            raise BadAnswer(f"{answer.head.whole('points')} points were classified, not {count}")
-        occupied, free = (answer.bits(name, count).reshape(shape) for name in ("occupied", "free"))
-        return Classification(Version.of(answer.head), occupied, free)
+        of_all = asked(level, ignore_keep_outs, min_revision, map_uuid)
+        given = rows if len(rows) else STAND_IN
+
+        def ask(part: Part) -> Classification:
+            arrays, of_part = Arrays(), given[part.of]
+            answer = self._ask("classification", {"points": arrays.add(of_part), **of_all}, arrays, part)
+            count = len(of_part)
+            if answer.head.whole("points") != count:
+                raise BadAnswer(f"{answer.head.whole('points')} points were classified, not {count}")
+            occupied, free = (answer.bits(name, count) for name in ("occupied", "free"))
+            return Classification(Version.of(answer.head), occupied, free)
+
+        return self._in_parts(len(rows), rows.nbytes, shape, ask)

@@ -1,16 +1,19 @@
 """A map of a server by its name, and how requests to it are made."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from .._arrays import whole_of
+from .._arrays import Shape, whole_of
 from .._fields import Fields, fields_of
 from .._question import Arrays, QuestionAnswer
 from .._sessions import Sessions
 from .._transport.caller import Caller
+from .._transport.deadline import Deadline
 from .._transport.request import BYTES, JSON, Answer, Parameter, Request, path_of, target_of
 from ..errors import ArgumentError, excerpt
+from .parts import Answer as OfParts
+from .parts import Part, ask_in_parts
 
 
 class MapHandle:
@@ -50,13 +53,26 @@ class MapHandle:
         request = Request(method, self._target(*segments), JSON, [json.dumps(given, allow_nan=False).encode()])
         return fields_of(self._caller.call(request).body)
 
-    def _send_bytes(self, segment: str, pieces: list[memoryview], parameters: Mapping[str, Parameter]) -> Answer:
-        return self._caller.call(Request("POST", self._target(segment, **parameters), BYTES, pieces))
+    def _send_bytes(
+        self, segment: str, pieces: list[memoryview], parameters: Mapping[str, Parameter], part: Part | None = None
+    ) -> Answer:
+        given = {**parameters, **_of_part(part)}
+        request = Request("POST", self._target(segment, **given), BYTES, pieces)
+        return self._caller.call(request, None if part is None else part.deadline)
 
-    def _ask(self, question: str, head: Mapping[str, Any], arrays: Arrays) -> QuestionAnswer:
-        given = {name: value for name, value in head.items() if value is not None}
+    def _ask(self, question: str, head: Mapping[str, Any], arrays: Arrays, part: Part | None = None) -> QuestionAnswer:
+        given = {name: value for name, value in {**head, **_of_part(part)}.items() if value is not None}
         request = Request("POST", self._target(question), BYTES, arrays.body_of(given))
-        return QuestionAnswer(self._caller.call(request).body)
+        return QuestionAnswer(self._caller.call(request, None if part is None else part.deadline).body)
+
+    def _in_parts(self, count: int, array_bytes: int, shape: Shape, ask: Callable[[Part], OfParts]) -> OfParts:
+        """Asks about any number of elements, all of it within the time of one call: see `ask_in_parts`."""
+        return ask_in_parts(Deadline(self._caller.bounds.timeout_s), count, array_bytes, shape, ask)
+
+
+def _of_part(part: Part | None) -> dict[str, str]:
+    """What makes sure that all parts are of one map."""
+    return {} if part is None or part.map_uuid is None else {"map_uuid": part.map_uuid}
 
 
 def asked(level: int, ignore_keep_outs: bool, min_revision: int | None, map_uuid: str | None) -> dict[str, Any]:

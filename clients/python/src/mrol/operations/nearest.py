@@ -8,15 +8,16 @@ from numpy.typing import ArrayLike
 from .._arrays import F32, Bools, number_of, rows_of
 from .._question import I32, Arrays, Names
 from ..errors import BadAnswer
-from ..version import Version, Versioned
+from ..version import InParts, Version
 from .handle import MapHandle, asked, word_of
-from .occupancy import POINTS
+from .occupancy import POINTS, STAND_IN
+from .parts import Part
 
 MeasuredTo = Literal["cubes", "centers"]
 
 
 @dataclass(frozen=True, eq=False)
-class Nearest(Versioned):
+class Nearest(InParts):
     """What is nearest to each point. Arrays have the shape of the points without their last axis."""
 
     found: Bools
@@ -48,26 +49,31 @@ class NearestOperations(MapHandle):
         """The occupied voxel or the keep-out nearest to each point, within `radius_m` (64 voxels of the level at most).
 
         `points` has shape (..., 3), meters, in the map frame. Distances are to the cubes of voxels, or to their centers.
+        More than the server takes at once are asked about in several requests (see `query`).
 
         Raises `InvalidArgument` (`bad_radius`, `point_not_finite`, `point_out_of_range`).
         """
-        arrays = Arrays()
         rows, shape = rows_of(points, 3, "points", POINTS, self._request_bytes_max)
-        head = {
-            "points": arrays.add(rows),
+        of_all = {
             "radius_m": number_of(radius_m, "radius_m"),
             "to": word_of(to, "to"),
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
-        answer = self._ask("nearest", head, arrays)
-        count = len(rows)
-        if answer.head.whole("points") != count:
-            raise BadAnswer(f"{answer.head.whole('points')} points were looked at, not {count}")
-        return Nearest(
-            Version.of(answer.head),
-            answer.bits("found", count).reshape(shape),
-            answer.floats("distances_m", count).reshape(shape),
-            answer.voxels("voxels", count).reshape(*shape, 3),
-            answer.floats("away", count, 3).reshape(*shape, 3),
-            answer.names("keep_outs", count).reshape(shape),
-        )
+        given = rows if len(rows) else STAND_IN
+
+        def ask(part: Part) -> Nearest:
+            arrays, of_part = Arrays(), given[part.of]
+            answer = self._ask("nearest", {"points": arrays.add(of_part), **of_all}, arrays, part)
+            count = len(of_part)
+            if answer.head.whole("points") != count:
+                raise BadAnswer(f"{answer.head.whole('points')} points were looked at, not {count}")
+            return Nearest(
+                Version.of(answer.head),
+                answer.bits("found", count),
+                answer.floats("distances_m", count),
+                answer.voxels("voxels", count),
+                answer.floats("away", count, 3),
+                answer.names("keep_outs", count),
+            )
+
+        return self._in_parts(len(rows), rows.nbytes, shape, ask)

@@ -2,18 +2,23 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import F32, Bools, number_of, rows_of
 from .._question import I32, Arrays, Names
 from ..errors import ArgumentError, BadAnswer
-from ..version import Version, Versioned
+from ..version import InParts, Version
 from .checks import Unknown
 from .handle import MapHandle, asked, word_of
+from .occupancy import STAND_IN
+from .parts import Part
+
+AHEAD: F32 = np.array([[1, 0, 0]], "<f4")
 
 
 @dataclass(frozen=True, eq=False)
-class Rays(Versioned):
+class Rays(InParts):
     """What each ray meets first. Arrays have the shape of the rays."""
 
     hit: Bools
@@ -47,12 +52,12 @@ class RayOperations(MapHandle):
 
         `directions` or `ends` have shape (..., 3); `origins` the same, or (3,) for all rays. Map frame, meters. With
         `unknown="occupied"` a ray ends where no scan saw through.
+        More than the server takes at once are asked about in several requests (see `query`).
 
         Raises `InvalidArgument` (`bad_ray`, `point_out_of_range`), naming which.
         """
         if (directions is None) == (ends is None):
             raise ArgumentError("directions", "both or neither of directions and ends", "the only one of them")
-        arrays = Arrays()
         name, towards = ("ends", ends) if directions is None else ("directions", directions)
         assert towards is not None
         rows, shape = rows_of(towards, 3, name, f"{name} x y z, shape (..., 3)", self._request_bytes_max)
@@ -60,23 +65,31 @@ class RayOperations(MapHandle):
         starts, start_shape = rows_of(origins, 3, "origins", of_origins, self._request_bytes_max)
         if start_shape not in (shape, (), (1,)):
             raise ArgumentError("origins", f"shape {(*start_shape, 3)} for rays of shape {(*shape, 3)}", of_origins)
-        head = {
-            "origins": arrays.add(starts),
-            name: arrays.add(rows),
+        of_all = {
             "range_m": None if range_m is None else number_of(range_m, "range_m"),
             "unknown": word_of(unknown, "unknown"),
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
-        answer = self._ask("rays", head, arrays)
-        count = len(rows)
-        if answer.head.whole("rays") != count:
-            raise BadAnswer(f"{answer.head.whole('rays')} rays were cast, not {count}")
-        hits = answer.head.whole("hits")
-        return Rays(
-            Version.of(answer.head),
-            answer.bits("hit", count, hits).reshape(shape),
-            hits,
-            answer.floats("distances_m", count).reshape(shape),
-            answer.voxels("voxels", count).reshape(*shape, 3),
-            answer.names("keep_outs", count).reshape(shape),
-        )
+        has_own = len(starts) == len(rows)
+        # Where there is no ray one along x from the origin stands in.
+        given, begins = (rows, starts) if len(rows) else (AHEAD, STAND_IN)
+
+        def ask(part: Part) -> Rays:
+            arrays, of_part = Arrays(), given[part.of]
+            origins_of_part = begins[part.of] if has_own else begins
+            head = {"origins": arrays.add(origins_of_part), name: arrays.add(of_part), **of_all}
+            answer = self._ask("rays", head, arrays, part)
+            count = len(of_part)
+            if answer.head.whole("rays") != count:
+                raise BadAnswer(f"{answer.head.whole('rays')} rays were cast, not {count}")
+            hits = answer.head.whole("hits")
+            return Rays(
+                Version.of(answer.head),
+                answer.bits("hit", count, hits),
+                hits,
+                answer.floats("distances_m", count),
+                answer.voxels("voxels", count),
+                answer.names("keep_outs", count),
+            )
+
+        return self._in_parts(len(rows), rows.nbytes + starts.nbytes, shape, ask)
