@@ -11,6 +11,7 @@
 """
 
 from . import errors
+from ._scan_files.reader import read_scan, scan_files
 from .body import Body, Link
 from .client import Client, Health, Maps, connect
 from .errors import (
@@ -27,6 +28,7 @@ from .errors import (
     NotFound,
     PermissionDenied,
     ResourceExhausted,
+    ScanFileError,
     ServerError,
     TimedOut,
     TransportError,
@@ -128,6 +130,7 @@ __all__ = [
     "Rival",
     "ScanAnswer",
     "ScanEvent",
+    "ScanFileError",
     "ServerError",
     "Sighting",
     "Sphere",
@@ -155,4 +158,6 @@ __all__ = [
     "WrongPort",
     "connect",
     "errors",
+    "read_scan",
+    "scan_files",
 ]

@@ -2,6 +2,7 @@
 
 MrolError                 itself: a map file that changed, or could not be read, while it was sent
   ArgumentError           an argument was refused before anything was sent (a ValueError)
+  ScanFileError           a scan file that is broken or none (a ValueError)
   ServerError             the server refused; it changed nothing, but for the reason `outcome_unknown`
     InvalidArgument, Unauthenticated, PermissionDenied, NotFound, Conflict, FailedPrecondition,
     ResourceExhausted, DeadlineExceeded, Unavailable, Internal
@@ -23,6 +24,9 @@ from ._secrets import masked, masked_bytes
 
 EXCERPT_MAX = 200
 """Characters of a value that a message shows."""
+
+PROBLEM_MAX = 500
+"""Characters of what a message says about a file, which may repeat a part of it."""
 
 _ITEMS_MAX = 40
 _NESTING_MAX = 4
@@ -97,6 +101,23 @@ class ArgumentError(MrolError, ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.argument, self.value, self.expected)
+
+
+class ScanFileError(MrolError, ValueError):
+    """A scan file that cannot be read as what it is, or a folder without one.
+
+    `path` names it, `problem` says what is wrong, and `line` where, counted from 1, in a file of text.
+    """
+
+    def __init__(self, path: str, problem: str, line: int | None = None) -> None:
+        shown = problem if len(problem) <= PROBLEM_MAX else f"{problem[:PROBLEM_MAX]}..."
+        super().__init__(f"{path}{'' if line is None else f':{line}'}: {shown}")
+        self.path = path
+        self.problem = masked(shown)
+        self.line = line
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.path, self.problem, self.line)
 
 
 class ServerError(MrolError):
