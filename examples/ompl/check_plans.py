@@ -3,6 +3,8 @@
     python3 check_plans.py SERVER [--library LIBRARY] [--scans FOLDER]
 
 It checks itself too: plans of a checker that takes every motion for free have to be found out.
+
+What it needs: pip install -r examples/ompl/requirements.txt, from the root of the repository.
 """
 
 import argparse

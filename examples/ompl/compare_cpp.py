@@ -4,6 +4,8 @@
 
 `cpp/CMakeLists.txt` says how `plans` is built. Random pairs of start and goal in the building of `mrol demo`, and in a hall where its
 scans are there; RRT-Connect, each in a process of its own with the same seed. Every path is checked again by brute force.
+
+What it needs: pip install -r examples/ompl/requirements.txt, from the root of the repository.
 """
 
 import argparse

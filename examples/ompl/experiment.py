@@ -5,6 +5,8 @@
 Random pairs of start and goal in the building of `mrol demo`, and in a hall where its scans are there. Every path is checked
 again by brute force. Each checker has a process of its own, which begins with the same seed: as long as all answers are the
 same, planners draw the same states and ask the same questions, so that times compare the checkers alone.
+
+What it needs: pip install -r examples/ompl/requirements.txt, from the root of the repository.
 """
 
 import argparse

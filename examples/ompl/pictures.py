@@ -1,6 +1,8 @@
 """Draws the pictures of the guide: a plan through the hall and one through the demonstration's building.
 
     python3 examples/ompl/pictures.py target/release/mrol ../shared/data .readme
+
+What it needs: pip install -r examples/ompl/requirements.txt, from the root of the repository.
 """
 
 import sys

@@ -2,6 +2,8 @@
 
     python3 plan.py --map demo --from "1 7.6 1.2" --to "12.9 7.4 1.3" --picture path.png
     python3 plan.py --map demo --pairs 20 --planner bit-star --checker replica --library libmrol_replica.so
+
+What it needs: pip install -r examples/ompl/requirements.txt, from the root of the repository.
 """
 
 import argparse

@@ -1,14 +1,20 @@
-"""Shows a map as it grows in the viewer of rerun: follow_in_rerun.py --map NAME (pip install mrol[rerun]).
+"""Shows a map as it grows in the viewer of rerun: follow_in_rerun.py --map NAME.
 
 With `--save map.rrd` it writes what the viewer reads, and ends after `--changes` changes.
+
+It needs the package `mrol` and rerun: pip install './clients/python[rerun]', from the root of the repository.
 """
 
 import argparse
 
-import numpy as np
-import rerun as rr
+try:
+    import numpy as np
+    import rerun as rr
 
-import mrol
+    import mrol
+except ImportError as missing:
+    install = "pip install './clients/python[rerun]', from the root of the repository"
+    raise SystemExit(f"{missing.name} is not there: {install}") from None
 
 Voxels = set[tuple[int, ...]]
 

@@ -1,14 +1,21 @@
-"""A picture of a map from above and aslant: picture.py --map NAME --out map.png (pip install mrol[pictures])."""
+"""A picture of a map from above and aslant: picture.py --map NAME --out map.png.
+
+It needs the package `mrol` and matplotlib: pip install './clients/python[pictures]', from the root of the repository.
+"""
 
 import argparse
 
-import matplotlib as mpl
-import numpy as np
+try:
+    import matplotlib as mpl
+    import numpy as np
 
-import mrol
+    import mrol
 
-mpl.use("Agg")
-from matplotlib import pyplot as plt
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+except ImportError as missing:
+    install = "pip install './clients/python[pictures]', from the root of the repository"
+    raise SystemExit(f"{missing.name} is not there: {install}") from None
 
 SHOWN_MAX = 60_000
 """Voxels that are drawn: more take long and show no more."""

@@ -1,18 +1,23 @@
-"""A planner of OMPL that asks a map: plan.py --map NAME --from 1 1 1 --to 8 5 1 (pip install ompl).
+"""A planner of OMPL that asks a map: plan.py --map NAME --from 1 1 1 --to 8 5 1.
 
 A drone, a ball, flies through the map by RRT-Connect: each edge that the planner tries is one `check_motions`, and the path that it
 finds is shortened by one more, which asks for all shortcuts at once. `examples/ompl` of the repository has more: a copy of the map
 in the planner's process, batches, and checks of the paths by brute force.
+
+It needs the package `mrol` and OMPL: pip install ./clients/python ompl, from the root of the repository.
 """
 
 import argparse
 import itertools
 
-import numpy as np
-from numpy.typing import NDArray
-from ompl import base, geometric
+try:
+    import numpy as np
+    from numpy.typing import NDArray
+    from ompl import base, geometric
 
-import mrol
+    import mrol
+except ImportError as missing:
+    raise SystemExit(f"{missing.name} is not there: pip install ./clients/python ompl, from the root of the repository") from None
 
 Path = NDArray[np.float64]
 

@@ -24,14 +24,63 @@ def example(name: str, *arguments: object) -> str:
 
 
 def test_a_robot_maps_a_folder(client: mrol.Client, tmp_path: Path) -> None:
-    np.save(tmp_path / "0.npy", room((0, 0, 0), 20_000))
-    room((0.2, 0, 0), 20_000, 2).tofile(tmp_path / "1.f32")
-    np.savetxt(tmp_path / "2.xyz", room((0.4, 0.1, 0), 20_000, 3))
+    np.save(tmp_path / "scan1.npy", room((0, 0, 0), 20_000))
+    np.savetxt(tmp_path / "scan10.xyz", room((0.4, 0.1, 0), 20_000, 3))
+    room((0.2, 0, 0), 20_000, 2).tofile(tmp_path / "scan2.f32")
+    (tmp_path / "poses.txt").write_text("0 0 0 0 0 0 0 1\n")
     said = example("map_folder.py", tmp_path, "--server", client.address, "--map", "folder")
+    assert said.startswith("3 scans, in this order: scan1.npy scan2.f32 scan10.xyz\n")
     assert "3 of 3 scans are in the map" in said
     positions = client.map("folder").trajectory().positions_m
     np.testing.assert_allclose(positions, [[0, 0, 0], [0.2, 0, 0], [0.4, 0.1, 0]], atol=0.05)
     client.delete_map("folder")
+
+
+def test_a_folder_that_cannot_be_mapped_is_an_error(client: mrol.Client, tmp_path: Path) -> None:
+    def failed(folder: Path, *arguments: str, server: str = client.address) -> tuple[int, str]:
+        command = [sys.executable, str(EXAMPLES / "map_folder.py"), str(folder), "--map", "folder", "--server", server, *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.stderr.startswith("error: ")
+        assert done.stderr.count("\n") == 1
+        return done.returncode, done.stderr
+
+    code, said = failed(tmp_path / "nowhere")
+    assert code == 2
+    assert "No such file or directory" in said
+    assert "nowhere" in said
+    code, said = failed(tmp_path)
+    assert code == 2
+    assert f"{tmp_path}: no scan file in this folder" in said
+    assert [of.name for of in client.maps().maps if of.name == "folder"] == []
+    (tmp_path / "scan1.ply").write_text("solid\n")
+    code, said = failed(tmp_path)
+    assert code == 2
+    assert "scan1.ply:1: not a ply header" in said
+    code, said = failed(tmp_path, "--columns", "x y")
+    assert code == 2
+    assert "columns must be" in said
+    code, said = failed(tmp_path, server="127.0.0.1:1")
+    assert code == 1
+    assert "is `mrol serve` running there?" in said
+    client.delete_map("folder")
+
+
+@pytest.mark.parametrize(
+    ("name", "lacking", "install"),
+    [
+        ("map_folder.py", "mrol", "pip install ./clients/python,"),
+        ("picture.py", "matplotlib", "pip install './clients/python[pictures]',"),
+        ("plan.py", "ompl", "pip install ./clients/python ompl,"),
+        ("follow_in_rerun.py", "rerun", "pip install './clients/python[rerun]',"),
+    ],
+)
+def test_an_example_names_what_to_install(name: str, lacking: str, install: str) -> None:
+    path = EXAMPLES / name
+    without = f"import runpy, sys; sys.modules[{lacking!r}] = None; runpy.run_path({str(path)!r}, run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", without], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert done.stderr == f"{lacking} is not there: {install} from the root of the repository\n"
+    assert install in path.read_text()
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ompl") is None, reason="ompl is not installed")

@@ -13,4 +13,4 @@ def test_the_tour_does_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with serving(tmp_path) as server:
         monkeypatch.chdir(tmp_path)
         assert run_tour(GUIDE / "python.md", {"localhost:7333": server.address}) > 25
-    assert os.path.exists("floor1.mrol")
+    assert os.path.exists("python-tour.mrol")

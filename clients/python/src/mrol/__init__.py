@@ -2,7 +2,7 @@
 
     import mrol
 
-    m = mrol.connect("localhost:7333").map("floor1", resolution=0.05)
+    m = mrol.connect("localhost:7333").map("office-tour", resolution=0.05)
     m.insert(points)                  # float32 of shape (n, 3), sensor frame, meters
     m.query([[1, 2, 0.5]]).occupied   # array([ True])
 
