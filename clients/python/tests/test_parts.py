@@ -197,6 +197,13 @@ def test_groups_of_no_sphere_meet_nothing(hall: mrol.Map) -> None:
     assert found.first_hits.links.tolist() == [-1] * 3
 
 
+def test_a_body_of_nothing_is_none(hall: mrol.Map) -> None:
+    empty: list[Any] = [[], np.zeros(0)]
+    for body in empty:
+        with pytest.raises(mrol.ArgumentError, match=r"body\.links\[0\]\.spheres must be spheres"):
+            hall.check_poses(body, [[0, 0, 0]])
+
+
 def test_of_nothing_too_the_server_checks_the_rest(client: mrol.Client, hall: mrol.Map) -> None:
     with pytest.raises(mrol.InvalidArgument) as refused:
         hall.query([], level=20)

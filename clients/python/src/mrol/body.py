@@ -53,6 +53,9 @@ class Body:
         """A `Body`, a `Link`, or the spheres of one link: an array of shape (n, 4)."""
         if isinstance(value, Body):
             return value
+        is_empty = value.shape == (0,) if isinstance(value, np.ndarray) else isinstance(value, Sequence) and not value
+        if is_empty:
+            raise ArgumentError("body.links[0].spheres", excerpt(value), "spheres x y z r, shape (n, 4), one or more")
         return cls([value if isinstance(value, Link) else Link(spheres=value)])
 
     def json(self, arrays: Arrays, bytes_max: int) -> dict[str, Any]:

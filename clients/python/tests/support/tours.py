@@ -8,7 +8,7 @@ from pathlib import Path
 
 GUIDE = Path(__file__).parents[4] / "docs" / "guide"
 
-PRINTED = re.compile(r"^ *print\(.*\)   # (.*)$", re.MULTILINE)
+PRINTED = re.compile(r"^ *print\(.*\) {2,3}# (.*)$", re.MULTILINE)
 
 
 def run_tour(page: Path, addresses: Mapping[str, str]) -> int:
