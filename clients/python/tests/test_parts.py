@@ -112,6 +112,22 @@ def test_a_server_that_takes_fewer_gets_fewer(tmp_path: Path) -> None:
         assert refused.value.reason == "batch_too_large"
 
 
+def test_what_takes_too_long_at_once_is_cut(tmp_path: Path) -> None:
+    config = tmp_path / "config.toml"
+    config.write_text("[limits]\nquestion_time_max_s = 0.02\n")
+    with serving(tmp_path, "--config", str(config)) as server:
+        m = mrol.connect(server.address).map("m", resolution=0.1)
+        m.insert(room(), align=False)
+        edges = np.tile(POINTS.reshape(30, 2, 3), (1000, 1, 1))
+        free = m.check_motions(BALL, edges).free
+        np.testing.assert_array_equal(free.reshape(1000, 30), np.broadcast_to(free[:30], (1000, 30)))
+        assert not free.all()
+        # What is too long by itself stays refused.
+        with pytest.raises(mrol.DeadlineExceeded) as refused:
+            m.check_motions(np.tile(SPHERES, (20, 1)), [[[0, 0, 50], [0, 60, 50]]] * 2, step_m=1e-3)
+        assert refused.value.reason == "time_limit"
+
+
 def between_parts(monkeypatch: pytest.MonkeyPatch, then: Callable[[], object]) -> None:
     """Does something once, after the first part of a query."""
     call, waiting = mrol.Map._send_bytes, [then]  # noqa: SLF001

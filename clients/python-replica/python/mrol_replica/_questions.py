@@ -24,16 +24,19 @@ from mrol._arrays import counts_of, number_of, rows_of, vector_of, whole_of
 from mrol._question import Names
 from mrol.body import BodyLike, ConfigurationsLike, configurations_of
 from mrol.errors import ArgumentError, excerpt
-from mrol.operations.checks import Told, Unknown, ignored_shapes
+from mrol.operations.checks import A_SPHERE, ONE, Told, Unknown, ignored_shapes, rows_of_groups, stand_in_poses
 from mrol.operations.handle import flag_of
 from mrol.operations.motions import lengths_of
 from mrol.operations.nearest import MeasuredTo
-from mrol.operations.occupancy import POINTS, Lookup
+from mrol.operations.occupancy import POINTS, STAND_IN, Lookup
+from mrol.operations.parts import beginning_of
+from mrol.operations.rays import AHEAD
 from mrol.pose import PoseLike
 from mrol.shapes import Shape
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._parts import answered
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -78,7 +81,8 @@ class Questions:
     """What can be asked of a map inside this process.
 
     Threads may share it: questions run beside each other, without the lock of the interpreter. It stays with the process that
-    opened it; a child that was forked gets an error. Arrays may be changed again as soon as a call returns.
+    opened it; a child that was forked gets an error. Arrays may be changed again as soon as a call returns. More elements than
+    2,000,000 are asked about in parts, between which a map may change: `first_version` and `version` of the answer tell.
     """
 
     def __init__(self, inside: _native.Questions) -> None:
@@ -120,8 +124,14 @@ class Questions:
         rows, shape = _points_of(points)
         pose = None if map_from_points is None else Pose.of(map_from_points, "map_from_points").seven()
         bloom = _word(lookup, "lookup") == "bloom"
-        occupied, count, version = self._inside.query(rows, pose, _level(level), bloom, flag_of(keep_out, "keep_out"))
-        return Occupancy(version_of(version), occupied.reshape(shape), count)
+        options = pose, _level(level), bloom, flag_of(keep_out, "keep_out")
+        given = rows if len(rows) else STAND_IN
+
+        def ask(part: slice) -> Occupancy:
+            occupied, count, version = self._inside.query(given[part], *options)
+            return Occupancy(version_of(version), occupied, count)
+
+        return answered(len(rows), rows, shape, ask)
 
     def check_poses(
         self,
@@ -137,10 +147,9 @@ class Questions:
     ) -> Collisions:
         """Whether a body fits at each of many configurations: see `mrol.Map.check_poses`."""
         native = _prepared(body)
-        rows, shape = configurations_of(configurations, native.links, "configurations", BYTES_MAX)
-        told = self._inside.check_poses(
-            native,
-            rows,
+        links = native.links
+        rows, shape = configurations_of(configurations, links, "configurations", BYTES_MAX)
+        options = (
             _word(answer, "answer"),
             None if clearance_max_m is None else number_of(clearance_max_m, "clearance_max_m"),
             _regions(ignored, "ignored"),
@@ -148,7 +157,12 @@ class Questions:
             _level(level),
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
-        return _collisions(told, shape)
+        given = rows if len(rows) else stand_in_poses(links)
+
+        def ask(part: slice) -> Collisions:
+            return _collisions(self._inside.check_poses(native, given[part.start * links : part.stop * links], *options))
+
+        return answered(len(rows) // links, rows, shape, ask)
 
     def check_spheres(
         self,
@@ -171,9 +185,7 @@ class Questions:
             if int(counts.sum(dtype=np.uint64)) != len(rows):
                 raise ArgumentError("sizes", f"a sum of {counts.sum(dtype=np.uint64)}", f"counts of all {len(rows)} spheres")
             shape = counts.shape
-        told = self._inside.check_spheres(
-            rows,
-            counts,
+        options = (
             number_of(padding_m, "padding_m"),
             _word(answer, "answer"),
             None if clearance_max_m is None else number_of(clearance_max_m, "clearance_max_m"),
@@ -182,7 +194,17 @@ class Questions:
             _level(level),
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
-        return _collisions(told, shape)
+        given, groups = (rows, counts) if len(counts) else (A_SPHERE, ONE)
+
+        def ask(part: slice) -> Collisions:
+            of_part, sizes_of_part = rows_of_groups(given, groups, part), groups[part]
+            if len(of_part):
+                return _collisions(self._inside.check_spheres(of_part, sizes_of_part, *options))
+            # Groups of no sphere: one more, of one, since no question is taken without a sphere.
+            more = np.concatenate([sizes_of_part, ONE])
+            return beginning_of(_collisions(self._inside.check_spheres(A_SPHERE, more, *options)), len(sizes_of_part))
+
+        return answered(len(counts), rows, shape, ask)
 
     def check_motions(
         self,
@@ -201,10 +223,8 @@ class Questions:
         native = _prepared(body)
         rows, lead = configurations_of(configurations, native.links, "configurations", BYTES_MAX)
         counts, shape = lengths_of(lead, lengths)
-        free, count, first_hits, clearances_m, version = self._inside.check_motions(
-            native,
-            rows,
-            counts,
+        links = native.links
+        options = (
             None if step_m is None else number_of(step_m, "step_m"),
             None if clearance_max_m is None else number_of(clearance_max_m, "clearance_max_m"),
             _regions(ignored, "ignored"),
@@ -212,8 +232,15 @@ class Questions:
             _level(level),
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
-        clearances = None if clearances_m is None else clearances_m.reshape(shape)
-        return Motions(version_of(version), free.reshape(shape), count, first_hits.reshape(shape), clearances)
+        given, lengths_given = (rows, counts) if len(counts) else (stand_in_poses(2 * links), 2 * ONE)
+
+        def ask(part: slice) -> Motions:
+            of_part = rows_of_groups(given, lengths_given, part, links)
+            told = self._inside.check_motions(native, of_part, lengths_given[part], *options)
+            free, count, first_hits, clearances_m, version = told
+            return Motions(version_of(version), free, count, first_hits, clearances_m)
+
+        return answered(len(counts), rows, shape, ask)
 
     def cast_rays(
         self,
@@ -236,18 +263,25 @@ class Questions:
         starts, start_shape = rows_of(origins, 3, "origins", of_origins, BYTES_MAX)
         if start_shape not in (shape, (), (1,)):
             raise ArgumentError("origins", f"shape {(*start_shape, 3)} for rays of shape {(*shape, 3)}", of_origins)
-        hit, count, distances_m, voxels, keep_outs, version = self._inside.cast_rays(
-            starts,
-            rows,
+        options = (
             directions is None,
             None if range_m is None else number_of(range_m, "range_m"),
             _word(unknown, "unknown") == "occupied",
             _level(level),
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
-        names = _names(keep_outs, len(rows)).reshape(shape)
-        met = voxels.reshape(*shape, 3)
-        return Rays(version_of(version), hit.reshape(shape), count, distances_m.reshape(shape), met, names)
+        given, begins = (rows, starts) if len(rows) else (AHEAD, STAND_IN)
+        has_own = len(starts) == len(rows)
+
+        def ask(part: slice) -> Rays:
+            towards_of_part = given[part]
+            hit, count, distances_m, voxels, keep_outs, version = self._inside.cast_rays(
+                begins[part] if has_own else begins, towards_of_part, *options
+            )
+            names = _names(keep_outs, len(towards_of_part))
+            return Rays(version_of(version), hit, count, distances_m, voxels.reshape(-1, 3), names)
+
+        return answered(len(rows), rows, shape, ask)
 
     def nearest(
         self,
@@ -260,28 +294,33 @@ class Questions:
     ) -> Nearest:
         """The occupied voxel or the keep-out nearest to each point: see `mrol.Map.nearest`."""
         rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
-        found, distances_m, voxels, away, keep_outs, version = self._inside.nearest(
-            rows,
+        options = (
             number_of(radius_m, "radius_m"),
             _word(to, "to") == "centers",
             _level(level),
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
-        return Nearest(
-            version_of(version),
-            found.reshape(shape),
-            distances_m.reshape(shape),
-            voxels.reshape(*shape, 3),
-            away.reshape(*shape, 3),
-            _names(keep_outs, len(rows)).reshape(shape),
-        )
+        given = rows if len(rows) else STAND_IN
+
+        def ask(part: slice) -> Nearest:
+            of_part = given[part]
+            found, distances_m, voxels, away, keep_outs, version = self._inside.nearest(of_part, *options)
+            names = _names(keep_outs, len(of_part))
+            return Nearest(version_of(version), found, distances_m, voxels.reshape(-1, 3), away.reshape(-1, 3), names)
+
+        return answered(len(rows), rows, shape, ask)
 
     def classify(self, points: ArrayLike, *, level: int = 0, ignore_keep_outs: bool = False) -> Classification:
         """Whether points are occupied, free or unknown: see `mrol.Map.classify`."""
         rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
-        ignores = flag_of(ignore_keep_outs, "ignore_keep_outs")
-        occupied, free, version = self._inside.classify(rows, _level(level), ignores)
-        return Classification(version_of(version), occupied.reshape(shape), free.reshape(shape))
+        options = _level(level), flag_of(ignore_keep_outs, "ignore_keep_outs")
+        given = rows if len(rows) else STAND_IN
+
+        def ask(part: slice) -> Classification:
+            occupied, free, version = self._inside.classify(given[part], *options)
+            return Classification(version_of(version), occupied, free)
+
+        return answered(len(rows), rows, shape, ask)
 
 
 def region_of(shape: Shape, argument: str) -> tuple[str, list[float]]:
@@ -348,14 +387,12 @@ def _names(names: "list[str | None] | None", count: int) -> Names:
     return found
 
 
-def _collisions(told: "_native.Checked", shape: tuple[int, ...]) -> Collisions:
+def _collisions(told: "_native.Checked") -> Collisions:
     colliding, count, hits, room, version = told
     first_hits = clearances = None
     if hits is not None:
         links, parts, voxels, keep_outs = hits
-        names = _names(keep_outs, len(links)).reshape(shape)
-        first_hits = FirstHits(links.reshape(shape), parts.reshape(shape), voxels.reshape(*shape, 3), names)
+        first_hits = FirstHits(links, parts, voxels.reshape(-1, 3), _names(keep_outs, len(links)))
     if room is not None:
-        clearances_m, nearest_links = room
-        clearances = Clearances(clearances_m.reshape(shape), nearest_links.reshape(shape))
-    return Collisions(version_of(version), colliding.reshape(shape), count, first_hits, clearances)
+        clearances = Clearances(*room)
+    return Collisions(version_of(version), colliding, count, first_hits, clearances)

@@ -149,10 +149,9 @@ class CheckOperations(MapHandle):
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
         given, sizes_given = (rows, counts) if len(counts) else (A_SPHERE, ONE)
-        ends = ends_of(sizes_given)
 
         def ask(part: Part) -> Collisions:
-            arrays, of_part, count = Arrays(), given[ends[part.of.start] : ends[part.of.stop]], part.of.stop - part.of.start
+            arrays, of_part, count = Arrays(), rows_of_groups(given, sizes_given, part.of), part.of.stop - part.of.start
             sizes_of_part = sizes_given[part.of]
             if not len(of_part):
                 # Groups of no sphere: one more, of one, since the server takes no question without a sphere.
@@ -173,9 +172,12 @@ def stand_in_poses(count: int) -> F32:
     return poses
 
 
-def ends_of(counts: U32) -> I64:
-    """Where groups of so many rows begin and end, of which one has its end where the next one begins."""
-    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+def rows_of_groups(rows: F32, counts: U32, part: slice, rows_each: int = 1) -> F32:
+    """The rows of a part of groups, each of so many rows, or of so many times as many."""
+    if part.stop - part.start == len(counts):
+        return rows
+    begin, inside = (int(counts[of].sum(dtype=np.int64)) * rows_each for of in (slice(0, part.start), part))
+    return rows[begin : begin + inside]
 
 
 def obstacles_of(ignored: Sequence[Shape], unknown: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..body import Body, BodyLike, ConfigurationsLike, configurations_of
 from ..errors import ArgumentError, BadAnswer
 from ..shapes import Shape
 from ..version import InParts, Version
-from .checks import ONE, Unknown, ends_of, obstacles_of, stand_in_poses
+from .checks import ONE, Unknown, obstacles_of, rows_of_groups, stand_in_poses
 from .handle import MapHandle, asked
 from .parts import Part
 
@@ -68,13 +68,12 @@ class MotionOperations(MapHandle):
             **asked(level, ignore_keep_outs, min_revision, map_uuid),
         }
         given, lengths_given = (rows, counts) if len(counts) else (stand_in_poses(2 * links), 2 * ONE)
-        ends = ends_of(lengths_given) * links
 
         def ask(part: Part) -> Motions:
             arrays, of_part = Arrays(), lengths_given[part.of]
             head = {
                 "body": checked.json(arrays, self._request_bytes_max),
-                "configurations": arrays.add(given[ends[part.of.start] : ends[part.of.stop]]),
+                "configurations": arrays.add(rows_of_groups(given, lengths_given, part.of, links)),
                 "lengths": arrays.add(of_part),
                 **of_all,
             }

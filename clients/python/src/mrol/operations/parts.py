@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Shape
 from .._transport.deadline import Deadline
-from ..errors import InvalidArgument
+from ..errors import DeadlineExceeded, InvalidArgument
 from ..version import InParts, Version
 
 ELEMENTS_MAX = 2_000_000
@@ -18,11 +18,11 @@ ELEMENTS_MAX = 2_000_000
 BYTES_MAX = 31 << 20
 """Bytes of the arrays of a request: what `message_bytes_max` leaves to them, unless the server is set to another."""
 
-TOO_LARGE = ("batch_too_large", "body_too_large")
+TOO_MUCH = ("batch_too_large", "body_too_large", "time_limit")
 """Reasons of refusals after which fewer elements may be taken."""
 
-CUT_MIN = 1024
-"""Elements that are not cut further: then it is something else that is too large."""
+CUT_MIN = 16
+"""Elements that are not cut further: then it is something else that is too much."""
 
 Answer = TypeVar("Answer", bound=InParts)
 
@@ -43,7 +43,7 @@ def ask_in_parts(deadline: Deadline, count: int, array_bytes: int, shape: Shape,
     in for them. One request is made where the server takes so many; of several each is of a revision of its own.
     """
     if count == 0:
-        return _shaped(beginning_of(ask(Part(slice(0, 1), None, deadline)), 0), shape)
+        return shaped(beginning_of(ask(Part(slice(0, 1), None, deadline)), 0), shape)
     requests = max(-(-count // ELEMENTS_MAX), -(-array_bytes // BYTES_MAX))
     at_once = -(-count // requests)
     answers: list[Answer] = []
@@ -52,13 +52,13 @@ def ask_in_parts(deadline: Deadline, count: int, array_bytes: int, shape: Shape,
         part = slice(begin, min(begin + at_once, count))
         try:
             answers.append(ask(Part(part, answers[0].map_uuid if answers else None, deadline)))
-        except InvalidArgument as refused:
-            if refused.reason not in TOO_LARGE or at_once <= CUT_MIN:
+        except (InvalidArgument, DeadlineExceeded) as refused:
+            if refused.reason not in TOO_MUCH or at_once <= CUT_MIN:
                 raise
             at_once = -(-at_once // 2)
         else:
             begin = part.stop
-    return _shaped(_joined(answers), shape)
+    return shaped(_joined(answers), shape)
 
 
 def beginning_of(answer: Answer, count: int) -> Answer:
@@ -90,7 +90,7 @@ def _join(values: list[Any]) -> Any:
     return replace(last, **{of.name: _join([getattr(value, of.name) for value in values]) for of in fields(last)})
 
 
-def _shaped(answer: Answer, shape: Shape) -> Answer:
+def shaped(answer: Answer, shape: Shape) -> Answer:
     """The answer with the elements in the shape in which they were given."""
     shaped: Answer = _mapped(answer, lambda array: array.reshape((*shape, *array.shape[1:])), lambda number: number)
     return shaped
