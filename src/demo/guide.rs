@@ -23,7 +23,7 @@ See the map: {page}
 
 {lead}
   curl http://{http}/v1/maps/demo
-  curl --json '{{"points":[[4.6,9.0,1.0],[4.6,6.9,1.0]]}}' http://{http}/v1/maps/demo/occupancy
+  curl -H 'content-type: application/json' -d '{{"points":[[4.6,9.0,1.0],[4.6,6.9,1.0]]}}' http://{http}/v1/maps/demo/occupancy
   curl http://{http}/metrics
   grpcurl -plaintext -d '{{"map":"demo","robot":"lidar"}}' {grpc} mrol.v1.Mapping/GetTrajectory
   mrol maps show demo --server http://{grpc}

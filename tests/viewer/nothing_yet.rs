@@ -19,7 +19,7 @@ async fn who_has_no_map_is_told_what_to_do_makes_one_and_restores_one() {
     browser.open(&daemon.url("/")).await;
     browser.wait("document.getElementById('empty').textContent.includes('No map yet')").await;
     assert!(text(&browser, "#empty").await.contains(&format!(
-        "curl -X PUT --json '{{\"resolution_m\":0.05}}' {}",
+        "curl -X PUT -H 'content-type: application/json' -d '{{\"resolution_m\":0.05}}' {}",
         daemon.url("/v1/maps/office")
     )));
 

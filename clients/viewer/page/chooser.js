@@ -87,8 +87,8 @@ export function firstCommands(map) {
   const address = location.origin + location.pathname.replace(/\/$/, "");
   const lines = [
     map ? "# a scan of three points, where it was taken" : "# make a map of 5 cm voxels",
-    map ? "" : `curl -X PUT --json '{"resolution_m":0.05}' ${address}/v1/maps/office`,
-    `curl --json '{"robot":"r1","points":[[1,2,0.5],[1,2.1,0.5],[1,2.2,0.5]],"align":false}' \\`,
+    map ? "" : `curl -X PUT -H 'content-type: application/json' -d '{"resolution_m":0.05}' ${address}/v1/maps/office`,
+    `curl -H 'content-type: application/json' -d '{"robot":"r1","points":[[1,2,0.5],[1,2.1,0.5],[1,2.2,0.5]],"align":false}' \\`,
     `     ${address}/v1/maps/${map ?? "office"}/scans`,
     "",
     "# or watch two simulated robots build one",
