@@ -1,12 +1,11 @@
 //! Watching a map: the state, every change as it becomes durable, and replicas that follow.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::time::Duration;
 
 use mrol::bloom::FilterSettings;
 use mrol::client::{Answers, Client, Replica, ReplicaOptions};
-use mrol::map::{ContentHash, Lookup, MapName, Region};
+use mrol::map::{ContentHash, Lookup, MapName, Region, StateHash};
 use mrol::service::{
     BlockBytes, Cause, PointQuery, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedSince,
 };
@@ -17,6 +16,7 @@ use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::support::daemon::{Daemon, PATIENCE, bytes_of, json_of, pose_json, row};
+use crate::support::map_folders::copy_folder;
 use crate::support::plain_set::{PlainSet, content_hash, up};
 
 fn map(name: &str) -> MapName {
@@ -37,6 +37,7 @@ struct Watcher {
     map_uuid: Uuid,
     revision: u64,
     hash: Option<u64>,
+    state_hash: Option<StateHash>,
     voxels: PlainSet,
     resets: usize,
     /// It watches a region, of which there is no hash.
@@ -47,7 +48,7 @@ struct Watcher {
 impl Watcher {
     /// Takes a message; parts are applied as they come.
     fn take(&mut self, message: WatchMessage) {
-        self.map_uuid = message.map_uuid;
+        (self.map_uuid, self.state_hash) = (message.map_uuid, message.state_hash);
         match message.event {
             WatchEvent::Heartbeat => assert_eq!(message.head_revision, self.revision),
             WatchEvent::State(part) => {
@@ -86,7 +87,8 @@ impl Watcher {
 
     fn since(&self) -> Option<WatchedSince> {
         let content_hash = self.hash.map(ContentHash::from_bits);
-        Some(WatchedSince { revision: self.revision, map_uuid: self.map_uuid, content_hash })
+        let (revision, map_uuid, state_hash) = (self.revision, self.map_uuid, self.state_hash);
+        Some(WatchedSince { revision, map_uuid, content_hash, state_hash })
     }
 }
 
@@ -161,7 +163,7 @@ async fn a_watcher_goes_on_after_a_restart_as_far_as_the_journal_reaches() {
     assert_eq!((watcher.resets, watcher.causes.len()), (1, 12));
     // Of another map, of a revision that is not there, and of one that is not kept, the state is told first.
     let elsewhere = |revision, map_uuid| WatchRequest {
-        since: Some(WatchedSince { revision, map_uuid, content_hash: None }),
+        since: Some(WatchedSince { revision, map_uuid, content_hash: None, state_hash: None }),
         ..WatchRequest::default()
     };
     for (revision, map_uuid) in [(12, Uuid::nil()), (13, watcher.map_uuid), (u64::MAX, watcher.map_uuid)] {
@@ -170,18 +172,6 @@ async fn a_watcher_goes_on_after_a_restart_as_far_as_the_journal_reaches() {
         let mut told = client.watch(&map("a"), elsewhere(revision, map_uuid)).await.unwrap();
         other.read_to(&mut told, 12).await;
         assert_eq!((other.resets, other.voxels), (1, watcher.voxels.clone()));
-    }
-}
-
-/// Copies a folder with what is in it.
-fn copy_folder(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let to = to.join(entry.file_name());
-        match entry.file_type().unwrap().is_dir() {
-            true => copy_folder(&entry.path(), &to),
-            false => drop(std::fs::copy(entry.path(), to).unwrap()),
-        }
     }
 }
 
@@ -224,7 +214,8 @@ async fn a_copy_of_what_was_lost_when_an_older_data_folder_was_put_back_gets_the
     for mut watcher in before {
         let region = watcher.is_part.then_some(region);
         // Who sends no hash, as clients did before there was one, is believed its revision: what is lost stays in its copy.
-        let since = watcher.since().map(|since| WatchedSince { content_hash: None, ..since });
+        let since =
+            watcher.since().map(|since| WatchedSince { content_hash: None, state_hash: None, ..since });
         let request = WatchRequest { since, region, ..WatchRequest::default() };
         let mut told = client.watch(&map("a"), request).await.unwrap();
         let first = told.next().await.unwrap().unwrap().event;
@@ -242,8 +233,10 @@ async fn a_copy_of_what_was_lost_when_an_older_data_folder_was_put_back_gets_the
         watcher.read_to(&mut told, next).await;
         assert_eq!(watcher.resets, 2);
         let since = format!("since_revision={}&map_uuid={}", watcher.revision, watcher.map_uuid);
-        for (hash, is_refused) in [("0123456789abcdef", false), ("xyz", true), ("+123456789abcdef", true)] {
-            let path = format!("/v1/maps/a/watch?{since}&since_content_hash={hash}");
+        let tried = [("0123456789abcdef", false), ("xyz", true), ("+123456789abcdef", true)];
+        let fields = ["since_content_hash", "since_state_hash"];
+        for (field, (hash, is_refused)) in fields.into_iter().flat_map(|field| tried.map(|of| (field, of))) {
+            let path = format!("/v1/maps/a/watch?{since}&{field}={hash}");
             let mut answer = daemon.get(&path).await;
             assert_eq!(answer.status() == 400, is_refused, "{hash}");
             if !is_refused {

@@ -13,7 +13,7 @@ use tonic::Code;
 use uuid::Uuid;
 
 use crate::support::daemon::{Daemon, bytes_of, client, identity_json, json_of, row, scan_pb};
-use crate::support::map_folders::folder_of;
+use crate::support::map_folders::{copy_folder, folder_of};
 
 /// A copy of a folder under `tests/released`.
 fn released(folder: &str) -> tempfile::TempDir {
@@ -21,19 +21,6 @@ fn released(folder: &str) -> tempfile::TempDir {
     let copy = tempfile::tempdir().unwrap();
     copy_folder(&from, copy.path());
     copy
-}
-
-fn copy_folder(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let from = entry.unwrap().path();
-        let to = to.join(from.file_name().unwrap());
-        if from.is_dir() {
-            copy_folder(&from, &to);
-        } else {
-            std::fs::copy(&from, &to).unwrap();
-        }
-    }
 }
 
 pub(super) fn put_file(daemon: &Daemon, path: &str, file: Vec<u8>) -> reqwest::RequestBuilder {

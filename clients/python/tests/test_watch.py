@@ -1,6 +1,7 @@
 """Watches: every kind of change, levels and boxes, and what ends them."""
 
 import dataclasses
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 import mrol
+
+from .support.server import serving
 
 
 def following(m: mrol.Map, events: Iterator[mrol.WatchEvent]) -> mrol.WatchedChange:
@@ -78,6 +81,55 @@ def test_a_watch_goes_on_from_a_version(empty: mrol.Map) -> None:
     assert isinstance(next(empty.watch(since=lost)), mrol.WatchedState)
     with pytest.raises(mrol.ArgumentError, match="since.content_hash"):
         empty.watch(since=dataclasses.replace(first.version, content_hash=-1))
+    with pytest.raises(mrol.ArgumentError, match="since.state_hash"):
+        empty.watch(since=dataclasses.replace(first.version, state_hash=1 << 64))
+
+
+def test_a_watch_that_comes_back_has_the_keep_outs_after_an_older_data_folder_was_put_back(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        m = mrol.connect(server.address).map("m", resolution=0.1)
+        m.insert([[1, 0, 0]], align=False)
+        server.stop()
+        shutil.copytree(tmp_path / "data", tmp_path / "cold")
+        server.start()
+        states, since = m.watch(), m.watch(since=m.describe(), heartbeats=True)
+        next(states)
+        next(since)
+        m.keep_out("lost", sphere=([0, 0, 0], 1))
+        for events in (states, since):
+            following(m, events)
+        server.stop()
+        shutil.rmtree(tmp_path / "data")
+        shutil.copytree(tmp_path / "cold", tmp_path / "data")
+        server.start()
+        m.keep_out("spill", sphere=([3, 0, 0], 1))
+        m.keep_out("dock", sphere=([0, 3, 0], 1))
+        for events in (states, since):
+            told = next(events)
+            assert isinstance(told, mrol.WatchedState)
+            assert [of.name for of in told.keep_outs] == ["dock", "spill"]
+
+
+def test_a_version_of_an_answer_gets_its_state_hash_from_the_first_heartbeat(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        m = mrol.connect(server.address).map("m", resolution=0.1)
+        m.insert([[1, 0, 0]], align=False)
+        server.stop()
+        shutil.copytree(tmp_path / "data", tmp_path / "cold")
+        server.start()
+        m.keep_out("lost", sphere=([0, 0, 0], 1))
+        # A watch tells of what is durable: once it does, so does another.
+        next(m.watch())
+        events = m.watch(since=m.describe(), heartbeats=True)
+        assert isinstance(next(events), mrol.Heartbeat)
+        server.stop()
+        shutil.rmtree(tmp_path / "data")
+        shutil.copytree(tmp_path / "cold", tmp_path / "data")
+        server.start()
+        m.keep_out("spill", sphere=([3, 0, 0], 1))
+        told = next(event for event in events if not isinstance(event, mrol.Heartbeat))
+        assert isinstance(told, mrol.WatchedState)
+        assert [of.name for of in told.keep_outs] == ["spill"]
 
 
 def test_a_watch_of_a_level_and_a_box_tells_those_alone(empty: mrol.Map) -> None:

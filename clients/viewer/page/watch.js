@@ -16,6 +16,8 @@ export class Watch {
   #revision;
   /** Of what the whole map holds at that revision, sixteen hexadecimal digits; none where it was not told. */
   #hash;
+  /** Of that and of what else a copy holds: keep-outs and viewpoints. */
+  #stateHash;
   #heard;
   #stop = new AbortController();
 
@@ -59,6 +61,7 @@ export class Watch {
     const query = { delta_level: 0, since_revision: this.#revision, map_uuid: this.#uuid };
     // With another hash the server has another history than we read, and tells of the whole state.
     if (this.#hash) query.since_content_hash = this.#hash;
+    if (this.#stateHash) query.since_state_hash = this.#stateHash;
     const silence = new AbortController();
     const signal = AbortSignal.any([this.#stop.signal, silence.signal]);
     const response = await ask(pathOf(this.#map, "watch"), { query, signal });
@@ -78,12 +81,15 @@ export class Watch {
   }
 
   #take(bytes) {
-    let state, change, failure;
+    let head, state, change, isHeartbeat, failure, stateHash;
     readMessage(bytes, {
       1: (uuid) => (this.#uuid = text(uuid)),
+      2: (revision) => (head = revision),
       3: (message) => (state = stateOf(message)),
       4: (message) => (change = changeOf(message)),
+      5: () => (isHeartbeat = true),
       6: (message) => (failure = failureOf(message)),
+      7: (_, eight) => (stateHash = hexOf(eight)),
     });
     if (failure) throw failure;
     if (state) {
@@ -91,9 +97,11 @@ export class Watch {
       if (state.isReset) this.#heard.reset();
       return;
     }
+    // The first answer to what we read names the hash of all of it.
+    if (isHeartbeat && head === this.#revision) this.#stateHash = stateHash;
     if (!change) return;
     this.#heard.change(change);
-    if (change.isComplete) [this.#revision, this.#hash] = [change.revision, change.hash];
+    if (change.isComplete) [this.#revision, this.#hash, this.#stateHash] = [change.revision, change.hash, stateHash];
   }
 }
 

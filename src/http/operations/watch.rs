@@ -1,4 +1,4 @@
-//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&since_content_hash=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`:
+//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&since_content_hash=&since_state_hash=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`:
 //! the changes of a map.
 //!
 //! The answer is a stream of messages, each the protobuf message `WatchResponse` that gRPC sends (`occupancy.proto`) behind
@@ -36,6 +36,8 @@ pub(crate) struct WatchParams {
     map_uuid: Option<String>,
     /// The map's content hash at that revision, as the client was told: where the map had another, the whole state comes first.
     since_content_hash: Option<String>,
+    /// The state hash that was told with that revision, in sixteen hexadecimal digits: the same for keep-outs and viewpoints too.
+    since_state_hash: Option<String>,
     /// Tell of the voxels of this level that came and went; without, of the finest as they were recorded.
     delta_level: Option<u32>,
     /// Smallest coordinates `x,y,z` of a box along the map's axes, meters; together with `max`.
@@ -83,11 +85,10 @@ pub(crate) async fn watch(
     Ok((content_type, Body::from_stream(messages)).into_response())
 }
 
-/// A content hash as answers in JSON tell it.
-fn hash_of(digits: &str) -> Result<u64, ServiceError> {
+/// A hash as answers in JSON tell it.
+fn hash_of(name: &str, digits: &str) -> Result<u64, ServiceError> {
     let refused = || {
-        let message =
-            format!("since_content_hash must have sixteen hexadecimal digits, got {:?}", excerpt(digits));
+        let message = format!("{name} must have sixteen hexadecimal digits, got {:?}", excerpt(digits));
         ServiceError::new(Reason::BadQuery, message)
     };
     let are_digits = digits.len() == 16 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
@@ -98,6 +99,7 @@ impl WatchParams {
     fn request(self, map: &MapName) -> Result<WatchRequest, ServiceError> {
         let Self { min, max, map_from_box, size, .. } = self;
         let region = RegionParams { min, max, map_from_box, size }.region()?;
+        let told = |name, digits: Option<String>| digits.map(|digits| hash_of(name, &digits)).transpose();
         let request = pb::WatchRequest {
             map: map.to_string(),
             since_revision: self.since_revision,
@@ -105,7 +107,8 @@ impl WatchParams {
             region: region.map(Into::into),
             delta_level: self.delta_level,
             viewpoints: self.viewpoints,
-            since_content_hash: self.since_content_hash.as_deref().map(hash_of).transpose()?,
+            since_content_hash: told("since_content_hash", self.since_content_hash)?,
+            since_state_hash: told("since_state_hash", self.since_state_hash)?,
         };
         let (_, request) = request.try_into()?;
         Ok(request)

@@ -11,12 +11,14 @@ class Version:
     """A map's revision, one more with each change, and the uuid of the map, another one where it was deleted and made again.
 
     `content_hash` is a hash of the finest voxels: equal for maps with equal voxels. It is None in an answer that was given again
-    after the map has moved on.
+    after the map has moved on. `state_hash` is a hash of keep-outs and viewpoints too, which a watch alone tells; it does not count
+    where versions are compared.
     """
 
     revision: int
     map_uuid: str
     content_hash: int | None = None
+    state_hash: int | None = field(default=None, compare=False)
 
     @classmethod
     def of(cls, fields: Fields) -> "Version":

@@ -10,7 +10,7 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::Pose;
 use mrol_map::map::{
     Change, ContentHash, ContentVersion, KEEP_OUTS_MAX, KeepOutRecord, KeepOuts, MapContents, MapSettings,
-    MultiResolutionMap, ViewpointChange,
+    MultiResolutionMap, StateHash, ViewpointChange,
 };
 use mrol_map::planning::Planner;
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Viewpoint, ViewpointSet};
@@ -54,6 +54,8 @@ pub(super) struct Builder {
     copied: Option<Copied>,
     /// The hash of what the whole map holds at the copy's revision, where the server told it.
     map_hash: Option<ContentHash>,
+    /// The hash of all that a copy may hold at the copy's revision, where the server told it.
+    state_hash: Option<StateHash>,
     state: Option<StateSoFar>,
     change: Option<ChangeSoFar>,
 }
@@ -86,6 +88,7 @@ impl Builder {
             is_whole: region.is_none(),
             copied: None,
             map_hash: None,
+            state_hash: None,
             state: None,
             change: None,
         }
@@ -96,7 +99,7 @@ impl Builder {
         let Copied { map, map_uuid, .. } = self.copied.as_ref()?;
         let ContentVersion { revision, hash } = map.content_version();
         let content_hash = if self.is_whole { Some(hash) } else { self.map_hash };
-        Some(WatchedSince { revision, map_uuid: *map_uuid, content_hash })
+        Some(WatchedSince { revision, map_uuid: *map_uuid, content_hash, state_hash: self.state_hash })
     }
 
     /// What was copied last.
@@ -121,12 +124,16 @@ impl Builder {
     /// # Errors
     /// For a message that cannot follow on those before it.
     pub(super) fn apply(&mut self, message: WatchMessage) -> Result<Applied, ReplicaError> {
-        let WatchMessage { map_uuid, event, .. } = message;
-        match event {
-            WatchEvent::Heartbeat => Ok(Applied::Nothing),
-            WatchEvent::State(part) => self.take_state(map_uuid, part),
-            WatchEvent::Change(part) => self.take_change(map_uuid, part),
+        let WatchMessage { map_uuid, state_hash, event, .. } = message;
+        let applied = match event {
+            WatchEvent::Heartbeat => Applied::Nothing,
+            WatchEvent::State(part) => self.take_state(map_uuid, part)?,
+            WatchEvent::Change(part) => self.take_change(map_uuid, part)?,
+        };
+        if !matches!(applied, Applied::Nothing) {
+            self.state_hash = state_hash;
         }
+        Ok(applied)
     }
 
     fn take_state(&mut self, map_uuid: Uuid, part: StatePart) -> Result<Applied, ReplicaError> {

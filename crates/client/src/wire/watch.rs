@@ -4,7 +4,7 @@ use prost::bytes::{BufMut, Bytes, BytesMut};
 
 use super::pb;
 use super::values::{InField, count_from, required, uuid_from};
-use mrol_map::map::{ContentHash, ContentVersion, MapName, RobotName, SessionName};
+use mrol_map::map::{ContentHash, ContentVersion, MapName, RobotName, SessionName, StateHash};
 use mrol_service::{
     BlockBytes, Cause, ChangePart, LeftViewpoint, Reason, ServiceError, StatePart, WatchEvent, WatchForm,
     WatchMessage, WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
@@ -15,11 +15,14 @@ impl TryFrom<pb::WatchRequest> for (MapName, WatchRequest) {
 
     fn try_from(request: pb::WatchRequest) -> Result<Self, ServiceError> {
         let content_hash = request.since_content_hash.map(ContentHash::from_bits);
+        let state_hash = request.since_state_hash.map(StateHash::from_bits);
         let since = match (request.since_revision, request.map_uuid.is_empty()) {
             (None, true) if content_hash.is_some() => return Err(half_a_version("since_content_hash")),
+            (None, true) if state_hash.is_some() => return Err(half_a_version("since_state_hash")),
             (None, true) => None,
             (Some(revision), false) => {
-                Some(WatchedSince { revision, map_uuid: uuid_from(&request.map_uuid)?, content_hash })
+                let map_uuid = uuid_from(&request.map_uuid)?;
+                Some(WatchedSince { revision, map_uuid, content_hash, state_hash })
             }
             (Some(_), true) => return Err(half_a_version("since_revision")),
             (None, false) => return Err(half_a_version("map_uuid")),
@@ -52,19 +55,21 @@ impl From<(&MapName, WatchRequest)> for pb::WatchRequest {
             },
             viewpoints,
             since_content_hash: since.and_then(|since| since.content_hash).map(ContentHash::to_bits),
+            since_state_hash: since.and_then(|since| since.state_hash).map(StateHash::to_bits),
         }
     }
 }
 
 impl From<WatchMessage> for pb::WatchResponse {
-    fn from(WatchMessage { map_uuid, head_revision, event }: WatchMessage) -> Self {
+    fn from(WatchMessage { map_uuid, head_revision, state_hash, event }: WatchMessage) -> Self {
         use pb::watch_response::Event;
         let event = match event {
             WatchEvent::Heartbeat => Event::Heartbeat(pb::Heartbeat {}),
             WatchEvent::State(part) => Event::State(part.into()),
             WatchEvent::Change(part) => Event::Change(part.into()),
         };
-        Self { map_uuid: map_uuid.to_string(), head_revision, event: Some(event) }
+        let (map_uuid, state_hash) = (map_uuid.to_string(), state_hash.map(StateHash::to_bits));
+        Self { map_uuid, head_revision, event: Some(event), state_hash }
     }
 }
 
@@ -90,7 +95,8 @@ impl TryFrom<pb::WatchResponse> for WatchMessage {
             }
         };
         let (map_uuid, head_revision) = (uuid_from(&message.map_uuid)?, message.head_revision);
-        Ok(Self { map_uuid, head_revision, event })
+        let state_hash = message.state_hash.map(StateHash::from_bits);
+        Ok(Self { map_uuid, head_revision, state_hash, event })
     }
 }
 

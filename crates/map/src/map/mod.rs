@@ -36,6 +36,7 @@ mod origin;
 mod regions;
 mod settings;
 mod shards;
+mod state_hash;
 mod trajectory;
 mod view;
 mod voxel_ownership;
@@ -47,7 +48,7 @@ pub use change::{
 };
 pub use commit::{Committer, ViewpointChange};
 pub use content_hash::{ContentHash, ContentVersion};
-pub use content_history::ContentHistory;
+pub use content_history::{ContentHistory, RevisionHashes};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use distance_block::{DISTANCE_CAP_MAX, DistanceBlock, margin_of};
 pub use info::{FilterInfo, LevelInfo, MapDescription};
@@ -72,6 +73,7 @@ pub use regions::{
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub(crate) use shards::TierView;
 pub use shards::{OccupiedVoxelList, SHARDS};
+pub use state_hash::StateHash;
 pub use trajectory::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
     ScanRecord, Trajectory, TrajectorySpacing, ViewpointRecord, WithdrawnChange,

@@ -1,10 +1,11 @@
-//! Small tools that know nothing of maps: bits of a word, a prefetch, how long things take, the
-//! stop signal of long work.
+//! Small tools that know nothing of maps: bits of a word, a prefetch, a hash of words, how long
+//! things take, the stop signal of long work.
 
 pub mod bits;
 mod clock;
 #[cfg(target_arch = "x86_64")]
 pub mod cpu;
+mod digest;
 mod durations;
 mod excerpt;
 mod keyword;
@@ -13,6 +14,7 @@ mod sorting;
 mod stop_signal;
 
 pub use clock::unix_time_ns;
+pub use digest::{Digest, mixed};
 pub use durations::{Durations, SharedDurations};
 pub use excerpt::excerpt;
 pub use keyword::{Keyword, words};

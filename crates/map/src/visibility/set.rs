@@ -7,6 +7,7 @@ use super::range_image::WellBeyond;
 use super::reach::{ReachIndex, Slot};
 use super::viewpoint::Viewpoint;
 use crate::geometry::{Pose, pose_difference};
+use crate::util::Digest;
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
 #[derive(Clone, Default)]
@@ -19,6 +20,8 @@ pub struct ViewpointSet {
     index: ReachIndex,
     bytes: usize,
     stored_bytes: usize,
+    /// The sum of the hashes of the viewpoints, each with its revision, modulo 2^64.
+    hash: u64,
 }
 
 /// How far an f32 of a place in a map may be off, meters.
@@ -37,6 +40,7 @@ impl ViewpointSet {
         self.by_revision.insert(revision, slot);
         self.bytes += viewpoint.memory_bytes();
         self.stored_bytes += viewpoint.image().stored_bytes();
+        self.hash = self.hash.wrapping_add(hash_at(revision, &viewpoint));
         self.places_m[slot as usize] =
             viewpoint.map_from_sensor().translation.vector.map(|c| c as f32).into();
         self.slots[slot as usize] = Some((revision, viewpoint));
@@ -50,6 +54,7 @@ impl ViewpointSet {
         self.unused.push(slot);
         self.bytes -= viewpoint.memory_bytes();
         self.stored_bytes -= viewpoint.image().stored_bytes();
+        self.hash = self.hash.wrapping_sub(hash_at(revision, &viewpoint));
         Some(viewpoint)
     }
 
@@ -86,6 +91,11 @@ impl ViewpointSet {
     /// Bytes of the images where they are stored.
     pub fn stored_bytes(&self) -> usize {
         self.stored_bytes
+    }
+
+    /// Hash of the viewpoints and their revisions: equal for equal sets, whatever came and went before.
+    pub fn hash(&self) -> u64 {
+        self.hash
     }
 
     /// True where one of the viewpoints saw beyond `point_m` (map frame, meters).
@@ -156,6 +166,10 @@ impl ViewpointSet {
     fn at(&self, slot: Slot) -> Option<&Arc<Viewpoint>> {
         Some(&self.slots.get(slot as usize)?.as_ref()?.1)
     }
+}
+
+fn hash_at(revision: u64, viewpoint: &Viewpoint) -> u64 {
+    Digest::default().word(revision).word(viewpoint.hash()).finish()
 }
 
 impl PartialEq for ViewpointSet {

@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 
 use super::range_image::{Met, RangeImage};
 use super::reach::Reach;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, rotation_xyzw, translation_m};
+use crate::util::Digest;
 
 /// Places that a viewpoint met, which scans are compared with.
 const MET: usize = 500;
@@ -82,6 +83,14 @@ impl Viewpoint {
     /// coordinates, meters.
     pub fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.reach.boxes_m()
+    }
+
+    /// Hash of where the scan was taken, and of how far it saw: equal for equal viewpoints.
+    pub(super) fn hash(&self) -> u64 {
+        let pose = Digest::default()
+            .numbers(&translation_m(&self.map_from_sensor))
+            .numbers(&rotation_xyzw(&self.map_from_sensor));
+        pose.bytes(&self.image.to_bytes()).finish()
     }
 
     pub(super) fn reach(&self) -> &Reach {

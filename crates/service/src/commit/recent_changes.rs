@@ -8,7 +8,7 @@ use tokio::sync::watch;
 
 use super::watched_change::WatchedChange;
 use crate::request::WatchForm;
-use mrol_map::map::{ContentHash, ContentHistory, ContentVersion, LevelSet};
+use mrol_map::map::{ContentHistory, ContentVersion, LevelSet, RevisionHashes, StateHash};
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::voxel::LEVELS_MAX;
 
@@ -31,7 +31,7 @@ struct Ring {
     bytes: usize,
     /// The map's revision.
     head: u64,
-    /// The content hashes of the last revisions, of more than there are changes of.
+    /// The hashes of the last revisions, of more than there are changes of.
     history: ContentHistory,
 }
 
@@ -60,14 +60,14 @@ impl RecentChanges {
         (0..LEVELS_MAX).filter(is_watched).collect()
     }
 
-    /// Adds the change that made the next revision. The oldest go where there is no room; one that is too large for all
+    /// Adds the change that made the next revision, after which all that a copy may hold has the hash `state`. The oldest go where there is no room; one that is too large for all
     /// of it leaves nothing.
-    pub(super) fn push(&self, change: WatchedChange) {
+    pub(super) fn push(&self, change: WatchedChange, state: StateHash) {
         let mut gone = Vec::new();
         let mut ring = self.ring.lock();
         (ring.head, ring.bytes) = (change.revision, ring.bytes + change.memory_bytes());
         if let Some(hash) = change.hash {
-            ring.history.push(ContentVersion { revision: change.revision, hash });
+            ring.history.push(ContentVersion { revision: change.revision, hash }, state);
         }
         ring.changes.push_back(Arc::new(change));
         while ring.bytes > self.bytes_max {
@@ -93,13 +93,13 @@ impl RecentChanges {
         self.durable.subscribe()
     }
 
-    /// The content hashes of the last revisions.
+    /// The hashes of the last revisions.
     pub(crate) fn history(&self) -> ContentHistory {
         self.ring.lock().history.clone()
     }
 
-    /// The content hash at `revision`; none where it is not known.
-    pub(crate) fn hash_at(&self, revision: u64) -> Option<ContentHash> {
+    /// The hashes at `revision`; none where they are not known.
+    pub(crate) fn hashes_at(&self, revision: u64) -> Option<RevisionHashes> {
         self.ring.lock().history.get(revision)
     }
 

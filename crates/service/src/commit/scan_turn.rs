@@ -126,11 +126,12 @@ mod tests {
     /// A map to which these changes were made, and what of them so many bytes remember.
     fn map_of(changes: &[Change], recent_bytes: usize) -> (MultiResolutionMap, Arc<RecentChanges>) {
         let map = MultiResolutionMap::new(MapSettings::new(0.1, 2)).unwrap();
-        let recent =
-            Arc::new(RecentChanges::new(0, ContentHistory::of(ContentVersion::default()), recent_bytes));
+        let history = ContentHistory::of(ContentVersion::default(), map.state_hash());
+        let recent = Arc::new(RecentChanges::new(0, history, recent_bytes));
         for change in changes {
             let committed = map.committer().apply(change);
-            recent.push(WatchedChange::of(committed.revision, None, change.clone(), Vec::new()));
+            let change = WatchedChange::of(committed.revision, None, change.clone(), Vec::new());
+            recent.push(change, map.state_hash());
         }
         (map, recent)
     }

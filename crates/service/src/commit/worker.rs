@@ -170,7 +170,8 @@ impl Worker {
                 self.durations.record(begin.elapsed());
             }
             drop(answer.send(Ok(committed)));
-            recent.push(WatchedChange::of(committed.revision, Some(committed.hash), change, levels));
+            let change = WatchedChange::of(committed.revision, Some(committed.hash), change, levels);
+            recent.push(change, self.map.state_hash());
         }
         self.tell_durable();
         self.thin_in_memory();

@@ -70,7 +70,7 @@ impl HostedMap {
         settings: &StoreSettings,
     ) -> Self {
         let map = map.into();
-        let history = ContentHistory::of(map.content_version());
+        let history = ContentHistory::of(map.content_version(), map.state_hash());
         Self::of_shared(threads, name, uuid, map, history, folder.map(Arc::new), settings)
     }
 

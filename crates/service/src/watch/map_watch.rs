@@ -85,8 +85,10 @@ impl Watch {
         let head = *durable.borrow();
         // A revision that is not there, of another map, or of another history of this one, is out of reach.
         let is_here = |since: &WatchedSince| {
-            let is_same = |hash| map.followers.recent.hash_at(since.revision) == Some(hash);
-            since.map_uuid == map.uuid && since.revision <= head && since.content_hash.is_none_or(is_same)
+            let here = map.followers.recent.hashes_at(since.revision);
+            let is_same = since.content_hash.is_none_or(|hash| here.is_some_and(|here| here.content == hash))
+                && since.state_hash.is_none_or(|hash| here.is_some_and(|here| here.state == hash));
+            since.map_uuid == map.uuid && since.revision <= head && is_same
         };
         let told = since.filter(is_here);
         let told = told.map(|since| since.revision);
@@ -100,7 +102,9 @@ impl Watch {
         // A heartbeat speaks of what was told, whatever has come this moment.
         let told = self.told.filter(|_| event == WatchEvent::Heartbeat);
         let head_revision = told.unwrap_or_else(|| *self.durable.borrow());
-        WatchMessage { map_uuid: self.map.uuid, head_revision, event }
+        let hashes = self.told.and_then(|told| self.map.followers.recent.hashes_at(told));
+        let state_hash = hashes.map(|hashes| hashes.state);
+        WatchMessage { map_uuid: self.map.uuid, head_revision, state_hash, event }
     }
 
     /// Begins to tell of the whole state, once it is durable.
@@ -161,7 +165,8 @@ impl Watch {
                 if revision > head || stop.is_stopped() {
                     break;
                 }
-                let change = WatchedChange::of(revision, recent.hash_at(revision), change, Vec::new());
+                let hash = recent.hashes_at(revision).map(|hashes| hashes.content);
+                let change = WatchedChange::of(revision, hash, change, Vec::new());
                 bytes += change.memory_bytes();
                 batch.push_back(Arc::new(change));
                 if batch.len() >= BATCH_MAX || bytes >= BATCH_BYTES {

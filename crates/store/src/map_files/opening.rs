@@ -29,7 +29,7 @@ pub struct OpenedMap {
     pub uuid: Uuid,
     /// The map at the revision of the last durable change.
     pub map: MultiResolutionMap,
-    /// The content hashes of the snapshot's revision and of those after it.
+    /// The hashes of the snapshot's revision and of those after it.
     pub history: ContentHistory,
     /// Revision of the snapshot that it was read from.
     pub snapshot: u64,
@@ -98,7 +98,7 @@ impl MapFolder {
             .map_err(|e| StoreError::damaged(&path, e.to_string()))?
             .ok_or(StoreError::Cancelled)?;
         let levels = map.settings().levels;
-        let mut history = ContentHistory::of(map.content_version());
+        let mut history = ContentHistory::of(map.content_version(), map.state_hash());
         let replay = |revision, change| {
             // What a snapshot may not hold, no change may bring in.
             if let Change::Insertion(scan) = &change {
@@ -109,7 +109,7 @@ impl MapFolder {
             }
             let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);
-            history.push(committed.version());
+            history.push(committed.version(), map.state_hash());
             (committed.revision == revision).then_some(()).ok_or(made)
         };
         let known = Known { snapshot: revision, durable: last_written.max(head) };

@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Iterator
 from contextlib import closing
+from dataclasses import replace
 
 from .._arrays import whole_of
 from .._fields import reading
@@ -39,10 +40,11 @@ class WatchOperations(MapHandle):
         First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
         change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
         where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
-        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The content hash of
-        `since` goes along: where the map had another one at that revision, since an older data folder was put back, a
-        `WatchedState` comes first. `box` leaves other
-        voxels out. With `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of
+        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The hashes of
+        `since` go along: where the map had others at that revision, since an older data folder was put back, a
+        `WatchedState` comes first. The version of an answer has the hash of voxels alone, that of an event the hash of
+        keep-outs and viewpoints too. `box` leaves other voxels out. With `heartbeats` it also tells that nothing has changed
+        (`Heartbeat`). `progress` is told of the bytes of
         the state; what it raises ends the watch.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
@@ -61,6 +63,8 @@ class WatchOperations(MapHandle):
             word_of(version.map_uuid, "since.map_uuid")
             if version.content_hash is not None:
                 whole_of(version.content_hash, "since.content_hash")
+            if version.state_hash is not None:
+                whole_of(version.state_hash, "since.state_hash")
         wants_heartbeats = flag_of(heartbeats, "heartbeats")
         silent_s = seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
@@ -80,8 +84,10 @@ class WatchOperations(MapHandle):
 
         with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect)) as events:
             for event in events:
-                # A heartbeat has no hash: that of the revision that it confirms still holds.
-                if not (isinstance(event, Heartbeat) and version is not None and _is_at(event.version, version)):
+                # A heartbeat has no content hash: that of the revision that it confirms still holds.
+                if isinstance(event, Heartbeat) and version is not None and _is_at(event.version, version):
+                    version = replace(version, state_hash=event.version.state_hash)
+                else:
                     version = event.version
                 if heartbeats or not isinstance(event, Heartbeat):
                     yield event
@@ -94,9 +100,13 @@ def _is_at(one: Version, other: Version) -> bool:
 def _since(version: Version | None) -> dict[str, Parameter]:
     if version is None:
         return {}
-    content_hash = None if version.content_hash is None else f"{version.content_hash:016x}"
+    content_hash, state_hash = map(_digits, (version.content_hash, version.state_hash))
     since: dict[str, Parameter] = {"since_revision": version.revision, "map_uuid": version.map_uuid}
-    return since | {"since_content_hash": content_hash}
+    return since | {"since_content_hash": content_hash, "since_state_hash": state_hash}
+
+
+def _digits(hash_: int | None) -> str | None:
+    return None if hash_ is None else f"{hash_:016x}"
 
 
 def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
@@ -108,7 +118,7 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
             with reading("a message of the watch"):
                 message = Message(data)
                 event: WatchEvent | None = None
-                map_uuid = message.text(1)
+                map_uuid, state_hash = message.text(1), message.whole(7) if message.has(7) else None
                 if message.has(3):
                     part = message.message(3)
                     if part.flag(1):
@@ -117,14 +127,14 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
                     if state_bytes > caller.bounds.answer_bytes_max:
                         raise ValueError("the state has more bytes than answer_bytes_max allows")
                     told(state_bytes, state_bytes if part.flag(2) else None)
-                    event = states.add(part, map_uuid)
+                    event = states.add(part, map_uuid, state_hash)
                 elif message.has(4):
                     change_bytes += data.nbytes
                     if change_bytes > caller.bounds.answer_bytes_max:
                         raise ValueError("a change has more bytes than answer_bytes_max allows")
-                    event = changes.add(message.message(4), map_uuid)
+                    event = changes.add(message.message(4), map_uuid, state_hash)
                 elif message.has(5):
-                    event = Heartbeat(Version(message.whole(2), map_uuid))
+                    event = Heartbeat(Version(message.whole(2), map_uuid, state_hash=state_hash))
                 elif message.has(6):
                     raise failure_of(message.message(6))
             if isinstance(event, WatchedState):

@@ -121,7 +121,7 @@ class StateParts:
     keep_outs: list[KeepOut] = field(default_factory=list)
     viewpoints: list[Viewpoint] = field(default_factory=list)
 
-    def add(self, state: Message, map_uuid: str) -> WatchedState | None:
+    def add(self, state: Message, map_uuid: str, state_hash: int | None) -> WatchedState | None:
         """Takes a part; the whole state where it is the last one."""
         self.blocks.append(blocks_of(bytes(state.data(8))))
         self.keep_outs += [_keep_out(of) for of in state.messages(9)]
@@ -129,7 +129,7 @@ class StateParts:
         if not state.flag(2):
             return None
         return WatchedState(
-            version=Version(state.whole(3), map_uuid, state.whole(4)),
+            version=Version(state.whole(3), map_uuid, state.whole(4), state_hash),
             resolution_m=state.double(5),
             levels=state.whole(6),
             level=state.whole(7),
@@ -146,15 +146,16 @@ class ChangeParts:
     removed: list[Blocks] = field(default_factory=list)
     added: list[Blocks] = field(default_factory=list)
 
-    def add(self, change: Message, map_uuid: str) -> WatchedChange | None:
+    def add(self, change: Message, map_uuid: str, state_hash: int | None) -> WatchedChange | None:
         """Takes a part; the whole change where it is the last one."""
         self.removed.append(blocks_of(bytes(change.data(4))))
         self.added.append(blocks_of(bytes(change.data(5))))
         if not change.flag(2):
             return None
         viewpoint = change.message(10)
+        content_hash = change.whole(3) if change.has(3) else None
         return WatchedChange(
-            version=Version(change.whole(1), map_uuid, change.whole(3) if change.has(3) else None),
+            version=Version(change.whole(1), map_uuid, content_hash, state_hash),
             removed_blocks=np.concatenate(self.removed),
             added_blocks=np.concatenate(self.added),
             cause=_cause(change),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::change::{KeepOutAct, KeepOutChange};
 use super::shape::KeepOutShape;
 use crate::map::name::{CallerName, KeepOutName};
+use crate::util::Digest;
 
 /// Keep-outs that a map may have.
 pub const KEEP_OUTS_MAX: usize = 256;
@@ -31,27 +32,54 @@ pub struct KeepOutsFull(usize, usize);
 
 /// The keep-outs of a map, by name.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct KeepOuts(BTreeMap<KeepOutName, KeepOut>);
+pub struct KeepOuts {
+    all: BTreeMap<KeepOutName, KeepOut>,
+    /// The sum of their hashes, modulo 2^64.
+    hash: u64,
+}
+
+impl KeepOut {
+    /// Hash of all that it is: equal for equal ones.
+    fn hash(&self) -> u64 {
+        let Self { name, shape, made_by, made_revision, expires_at_ns } = self;
+        // No caller has an empty name.
+        let made_by = made_by.as_ref().map_or("", CallerName::as_str);
+        let expiry = expires_at_ns.map_or([0, 0], |at| [1, at.cast_unsigned()]);
+        let digest = Digest::default().bytes(name.as_str().as_bytes()).bytes(made_by.as_bytes());
+        let digest = digest.word(*made_revision).word(expiry[0]).word(expiry[1]);
+        shape.add_to(digest).finish()
+    }
+}
 
 impl KeepOuts {
+    fn of(all: BTreeMap<KeepOutName, KeepOut>) -> Self {
+        let hash = all.values().fold(0_u64, |sum, keep_out| sum.wrapping_add(keep_out.hash()));
+        Self { all, hash }
+    }
+
     /// Number of keep-outs.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.all.len()
     }
 
     /// True without a keep-out.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.all.is_empty()
     }
 
     /// All of them, by name.
     pub fn iter(&self) -> impl Iterator<Item = &KeepOut> {
-        self.0.values()
+        self.all.values()
     }
 
     /// The one of that name.
     pub fn get(&self, name: &KeepOutName) -> Option<&KeepOut> {
-        self.0.get(name)
+        self.all.get(name)
+    }
+
+    /// Hash of all of them: equal for equal ones. 0 for none.
+    pub fn hash(&self) -> u64 {
+        self.hash
     }
 
     /// Those whose time is up at `now_ns`, nanoseconds since the Unix epoch.
@@ -62,7 +90,7 @@ impl KeepOuts {
     /// # Errors
     /// When there are `most` keep-outs already, and none of them is called `name`.
     pub fn check_room_for(&self, name: &KeepOutName, most: usize) -> Result<(), KeepOutsFull> {
-        match self.len() < most || self.0.contains_key(name) {
+        match self.len() < most || self.all.contains_key(name) {
             true => Ok(()),
             false => Err(KeepOutsFull(self.len(), most)),
         }
@@ -76,7 +104,7 @@ impl KeepOuts {
     /// These after the change that made `revision`.
     #[must_use]
     pub(in crate::map) fn after(&self, change: &KeepOutChange, revision: u64) -> Self {
-        let (name, mut all) = (change.name.clone(), self.0.clone());
+        let (name, mut all) = (change.name.clone(), self.all.clone());
         match change.act.clone() {
             KeepOutAct::Put { shape, made_by, expires_at_ns } => {
                 let made =
@@ -85,20 +113,23 @@ impl KeepOuts {
             }
             KeepOutAct::Removed { .. } | KeepOutAct::Expired => drop(all.remove(&name)),
         }
-        Self(all)
+        Self::of(all)
     }
 }
 
 impl FromIterator<KeepOut> for KeepOuts {
     /// Of several of one name, the last.
     fn from_iter<I: IntoIterator<Item = KeepOut>>(all: I) -> Self {
-        Self(all.into_iter().map(|keep_out| (keep_out.name.clone(), keep_out)).collect())
+        Self::of(all.into_iter().map(|keep_out| (keep_out.name.clone(), keep_out)).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use crate::map::keep_out::prism::Prism;
     use crate::map::regions::Region;
 
     fn name(text: &str) -> KeepOutName {
@@ -120,6 +151,41 @@ mod tests {
         let gone = |act| all.after(&KeepOutChange { name: name("b"), act }, 4);
         assert_eq!(gone(KeepOutAct::Expired), gone(KeepOutAct::Removed { by: None }));
         assert_eq!(gone(KeepOutAct::Expired).iter().map(|it| it.name.as_str()).collect::<Vec<_>>(), ["a"]);
+    }
+
+    #[test]
+    fn equal_keep_outs_have_equal_hashes_and_whatever_differs_counts() {
+        let all = KeepOuts::default().after(&put("a", 1.0, None), 1).after(&put("b", 2.0, Some(5)), 2);
+        let again: KeepOuts = all.iter().cloned().collect();
+        assert_eq!((again.hash(), KeepOuts::default().hash()), (all.hash(), 0));
+        let gone = all.after(&KeepOutChange { name: name("b"), act: KeepOutAct::Expired }, 3);
+        assert_eq!(gone.hash(), KeepOuts::default().after(&put("a", 1.0, None), 1).hash());
+        let prism = |z_to_m| {
+            let prism = Prism::new(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [0.0, z_to_m]).unwrap();
+            let shape = KeepOutShape::Prism(prism);
+            KeepOutChange {
+                name: name("b"),
+                act: KeepOutAct::Put { shape, made_by: None, expires_at_ns: None },
+            }
+        };
+        let by = CallerName::new("k").unwrap();
+        let ball = KeepOutShape::of_region(Region::ball([0.0; 3], 2.0).unwrap()).unwrap();
+        let act = KeepOutAct::Put { shape: ball, made_by: Some(by), expires_at_ns: Some(5) };
+        let first = KeepOuts::default().after(&put("a", 1.0, None), 1);
+        let hashes: BTreeSet<u64> = [
+            all.hash(),
+            first.hash(),
+            first.after(&put("b", 2.0, Some(5)), 3).hash(),
+            first.after(&put("b", 2.0, Some(6)), 2).hash(),
+            first.after(&put("b", 2.0, None), 2).hash(),
+            first.after(&put("b", 2.5, Some(5)), 2).hash(),
+            first.after(&put("c", 2.0, Some(5)), 2).hash(),
+            first.after(&prism(1.0), 2).hash(),
+            first.after(&prism(1.5), 2).hash(),
+            first.after(&KeepOutChange { name: name("b"), act }, 2).hash(),
+        ]
+        .into();
+        assert_eq!(hashes.len(), 10);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The space that a keep-out takes.
 
 use super::prism::{Prism, PrismError, is_near};
+use crate::geometry::{rotation_xyzw, translation_m};
 use crate::map::regions::{REGION_M_MAX, Region, RegionError};
+use crate::util::Digest;
 
 /// The space that a keep-out takes, in the map frame; borders belong to it. It is bounded.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +65,26 @@ impl KeepOutShape {
         match self {
             Self::Region(region) => region.bounds_m(),
             Self::Prism(prism) => prism.bounds_m(),
+        }
+    }
+
+    /// A hash with all numbers of the shape, and of which kind it is.
+    pub(super) fn add_to(&self, digest: Digest) -> Digest {
+        match self {
+            Self::Region(Region::Box { min_m, max_m }) => digest.word(1).numbers(min_m).numbers(max_m),
+            Self::Region(Region::Sphere { center_m, radius_m }) => {
+                digest.word(2).numbers(center_m).number(*radius_m)
+            }
+            Self::Region(Region::OrientedBox(of)) => {
+                let placed = of.map_from_box();
+                let digest = digest.word(3).numbers(&translation_m(placed)).numbers(&rotation_xyzw(placed));
+                digest.numbers(&of.size_m())
+            }
+            Self::Prism(prism) => {
+                let corners = prism.corners_m();
+                let digest = digest.word(4).numbers(&prism.z_m()).word(corners.len() as u64);
+                digest.numbers(corners.as_flattened())
+            }
         }
     }
 

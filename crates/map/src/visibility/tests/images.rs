@@ -159,7 +159,37 @@ fn a_set_says_of_every_point_what_its_viewpoints_say() {
         for (revision, _) in all {
             set.remove(revision);
         }
-        assert_eq!((set.len(), set.memory_bytes(), set.stored_bytes()), (0, 0, 0));
+        assert_eq!((set.len(), set.memory_bytes(), set.stored_bytes(), set.hash()), (0, 0, 0, 0));
+    }
+}
+
+#[test]
+fn equal_sets_have_equal_hashes_and_whatever_differs_counts() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let mut viewpoint = |bytes_max| {
+        let points = room(&mut random, 15_000, 1.0);
+        let image = RangeImage::of_points(&points, RANGE, bytes_max).unwrap();
+        Arc::new(Viewpoint::new(any_pose(&mut random, 6.0), image))
+    };
+    let (first, second, third) = (viewpoint(4096), viewpoint(4096), viewpoint(2048));
+    let of = |viewpoints: &[(u64, &Arc<Viewpoint>)]| {
+        let mut set = ViewpointSet::default();
+        set.extend(viewpoints.iter().map(|&(revision, viewpoint)| (revision, Arc::clone(viewpoint))));
+        set
+    };
+    let set = of(&[(1, &first), (2, &second)]);
+    let read = RangeImage::from_bytes(&first.image().to_bytes()).unwrap();
+    let read = Arc::new(Viewpoint::new(*first.map_from_sensor(), read));
+    assert_eq!(of(&[(2, &third), (2, &second), (1, &read)]).hash(), set.hash());
+    let elsewhere = Arc::new(Viewpoint::new(*second.map_from_sensor(), first.image().clone()));
+    for other in [
+        of(&[(1, &first)]),
+        of(&[(1, &second), (2, &first)]),
+        of(&[(1, &first), (3, &second)]),
+        of(&[(1, &elsewhere), (2, &second)]),
+        of(&[(1, &third), (2, &second)]),
+    ] {
+        assert_ne!(other.hash(), set.hash());
     }
 }
 
