@@ -207,7 +207,8 @@ typedef struct mrol_point_query {
     uint8_t reserved[7];
 } mrol_point_query;
 
-/* What all answers have, whatever was asked: all of one answer is of one revision. */
+/* What all answers have, whatever was asked: all of one answer is of one revision. Where a server took long for a question of a
+ * planner and let others go first meanwhile, it is of this revision or of later ones. */
 typedef struct mrol_answer {
     /* The state of the map that was asked. */
     mrol_map_version version;

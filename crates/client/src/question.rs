@@ -14,7 +14,7 @@ use mrol_service::{
 };
 
 impl Client {
-    /// Returns of each configuration whether a body meets a voxel, or what it meets first, or how much room it has, all at one revision.
+    /// Returns of each configuration whether a body meets a voxel, or what it meets first, or how much room it has, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -42,7 +42,7 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is, all at one revision.
+    /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -70,7 +70,7 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns of each motion whether a body can make it, all at one revision.
+    /// Returns of each motion whether a body can make it, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -98,7 +98,7 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns what each ray meets first, all at one revision.
+    /// Returns what each ray meets first, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -126,7 +126,7 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns the occupied voxel that is nearest to each point, all at one revision.
+    /// Returns the occupied voxel that is nearest to each point, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -154,7 +154,7 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns of each point whether it is occupied, free, or unknown, all at one revision.
+    /// Returns of each point whether it is occupied, free, or unknown, at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

@@ -10,6 +10,7 @@
 //! multi_resolution_map.rs   MultiResolutionMap   the shards, and the trajectory that is stored along (III, III-B)
 //! moments.rs                MomentsView          the moments of points, on which poses are refined (III-B)
 //! view.rs                   MapView              reading, at one revision
+//! pausing_view.rs           PausingView          reading for long, with pauses
 //! listing/, regions/                             the voxels of a level, all of them or those of a part of space
 //! change/, trajectory/      Change, Trajectory   what one revision did; the poses from which the map was seen (III-B)
 //! commit/                   Committer            changing, one change at a time
@@ -33,6 +34,7 @@ mod moments;
 mod multi_resolution_map;
 mod name;
 mod origin;
+mod pausing_view;
 mod regions;
 mod settings;
 mod shards;
@@ -59,7 +61,7 @@ pub use keep_out::{
     KeepOutsFull, Outline, PRISM_CORNERS_MAX, Prism, PrismError, ShapeRay, TooManyVoxels,
 };
 pub(crate) use listing::CellBounds;
-pub use listing::{LevelVoxels, blocks_in};
+pub use listing::{BlockParts, LevelVoxels, blocks_in};
 pub use lookup::Lookup;
 pub use moments::MomentsView;
 pub use multi_resolution_map::MultiResolutionMap;
@@ -67,6 +69,7 @@ pub use name::{
     CallerName, KeepOutName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName,
 };
 pub use origin::{MapOrigin, MapOriginError};
+pub use pausing_view::PausingView;
 pub use regions::{
     CellBox, Frustum, FrustumError, OrientedBox, REGION_M_MAX, Region, RegionError, VoxelSelection,
 };

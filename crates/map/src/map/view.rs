@@ -34,7 +34,12 @@ pub struct LongRead<'a> {
     _changes_wait: RwLockReadGuard<'a, ()>,
 }
 
-impl LongRead<'_> {
+impl<'a> LongRead<'a> {
+    /// The map that is read.
+    pub(super) fn map(&self) -> &'a MultiResolutionMap {
+        self.map
+    }
+
     /// Locks the whole map for reading.
     pub fn view(&self) -> MapView<'_> {
         self.map.view()
@@ -120,6 +125,11 @@ impl<'a> MapView<'a> {
     /// Where scans saw through, where the view was asked for that.
     pub fn viewpoints(&self) -> Option<&Arc<ViewpointSet>> {
         self.viewpoints.as_ref()
+    }
+
+    /// Gives the locks back: from now on the view covers nothing.
+    pub(super) fn let_go(&mut self) {
+        self.shards = [const { None }; SHARDS];
     }
 
     /// The lattices of the map's levels.

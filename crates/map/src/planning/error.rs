@@ -25,6 +25,17 @@ impl std::fmt::Display for SpherePlace {
     }
 }
 
+/// What of a question comes before a part of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Before {
+    /// Configurations, among those of all motions.
+    pub configurations: usize,
+    /// Motions.
+    pub motions: usize,
+    /// Spheres in groups.
+    pub spheres: usize,
+}
+
 /// Why numbers are not a question.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanningError {
@@ -183,4 +194,22 @@ pub enum PlanningError {
         /// The largest number of steps.
         steps_max: u64,
     },
+}
+
+impl PlanningError {
+    /// The error of a part of a question as one of the whole, of which so much comes before the part.
+    #[must_use]
+    pub fn behind(mut self, before: Before) -> Self {
+        match &mut self {
+            Self::Pose { configuration, .. } | Self::BodyRange { configuration, .. } => {
+                *configuration += before.configurations;
+            }
+            Self::SphereRange { sphere: number, .. }
+            | Self::Sphere { place: SpherePlace::InGroups(number), .. }
+            | Self::RadiusInVoxels { place: SpherePlace::InGroups(number), .. } => *number += before.spheres,
+            Self::Steps { motion, .. } => *motion += before.motions,
+            _ => {}
+        }
+        self
+    }
 }

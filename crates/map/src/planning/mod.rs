@@ -1,4 +1,4 @@
-//! What planners ask of a map, each question at one revision: does a body fit, at poses and along motions; where rays
+//! What planners ask of a map, each question at one revision unless others go first meanwhile: does a body fit, at poses and along motions; where rays
 //! end; what is nearest; what the map is seen from above.
 //!
 //! Of bodies, [`Body`] is what is asked about, [`Planner`] who is asked, and [`PlanningView`] has the questions.
@@ -31,7 +31,7 @@ pub use body::{
 };
 pub use check::{MotionAnswer, MotionQuestion, PoseQuestion, SphereGroups, SphereQuestion, prepared_bytes};
 pub use clearance::FIELD_BYTES_MAX_DEFAULT;
-pub use error::{PlanningError, SpherePlace};
+pub use error::{Before, PlanningError, SpherePlace};
 pub use frontiers::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, FrontierView, Frontiers,
     STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,

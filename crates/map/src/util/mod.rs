@@ -19,5 +19,5 @@ pub use durations::{Durations, SharedDurations};
 pub use excerpt::excerpt;
 pub use keyword::{Keyword, words};
 pub use prefetch::prefetch;
-pub use sorting::sort_by_key_until;
+pub use sorting::{sort_by_key_giving_way, sort_by_key_until};
 pub use stop_signal::{GiveWay, StopSignal};

@@ -7,6 +7,10 @@ use crate::sync::before_pause;
 
 /// Lets other work go first, where some waits.
 pub trait GiveWay {
+    /// True where other work waits, and the work that calls this has had its part: a call of [`GiveWay::give_way`] would
+    /// wait for the other.
+    fn is_due(&self) -> bool;
+
     /// Returns when the work that calls this is to go on: at once, or after other work.
     fn give_way(&self);
 
@@ -37,6 +41,11 @@ impl<'a> StopSignal<'a> {
     #[must_use]
     pub fn giving_way_by(self, turns: &'a dyn GiveWay) -> Self {
         Self { turns: Some(turns), ..self }
+    }
+
+    /// True where [`StopSignal::give_way`] would let other work go first: who holds a lock asks before it gives it back for that.
+    pub fn is_way_due(self) -> bool {
+        self.turns.is_some_and(GiveWay::is_due)
     }
 
     /// Lets other work go first, where some waits: to be called between the parts of long work, while no lock is held.
@@ -131,6 +140,10 @@ mod tests {
 
     struct Paused(Cell<Duration>);
     impl GiveWay for Paused {
+        fn is_due(&self) -> bool {
+            true
+        }
+
         fn give_way(&self) {
             self.0.set(self.0.get() + Duration::from_secs(60));
         }

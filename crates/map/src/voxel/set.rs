@@ -7,7 +7,7 @@ use super::lattice::LatticeFromPoints;
 use super::moments::MOMENT_LEVEL;
 use super::quantize;
 use crate::geometry::Point;
-use crate::util::{StopSignal, sort_by_key_until};
+use crate::util::{StopSignal, sort_by_key_giving_way, sort_by_key_until};
 
 /// Blocks that are worked on between two looks at the stop signal: some milliseconds.
 pub const BLOCKS_PER_LOOK: usize = 16 << 10;
@@ -127,6 +127,17 @@ impl VoxelSet {
     pub fn of_blocks_until(mut blocks: Vec<(VoxelKey, BlockMask)>, stop: StopSignal<'_>) -> Self {
         blocks.retain(|(_, mask)| !mask.is_empty());
         sort_by_key_until(&mut blocks, |(key, _)| *key, stop);
+        Self::of_sorted(blocks)
+    }
+
+    /// [`VoxelSet::of_blocks_until`] that lets other work go first between its parts: for who holds no lock.
+    pub fn of_blocks_giving_way(mut blocks: Vec<(VoxelKey, BlockMask)>, stop: StopSignal<'_>) -> Self {
+        blocks.retain(|(_, mask)| !mask.is_empty());
+        sort_by_key_giving_way(&mut blocks, |(key, _)| *key, stop);
+        Self::of_sorted(blocks)
+    }
+
+    fn of_sorted(mut blocks: Vec<(VoxelKey, BlockMask)>) -> Self {
         blocks.dedup_by(|later, kept| {
             let same = later.0 == kept.0;
             if same {

@@ -22,6 +22,6 @@ pub struct Asked {
 pub struct Answered<A> {
     /// The answer.
     pub answer: A,
-    /// All of it is at this state.
+    /// All of it is at this state; an answer that took long and let others go first is at this one or at later ones.
     pub version: MapVersion,
 }

@@ -1,5 +1,6 @@
 //! What checks of bodies have in common: how they are answered, and what is in the answer.
 
+use super::pieces::Joined;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use mrol_map::planning::{Clearance, Hit, PlanningError, PlanningView, clearance_max_m};
@@ -84,6 +85,29 @@ pub(super) fn check_ignored(regions: usize, limits: &Limits) -> Result<(), Servi
     let message =
         format!("ignored has {regions} regions, ignored_regions_max is {}", limits.ignored_regions_max);
     Err(ServiceError::new(Reason::BatchTooLarge, message))
+}
+
+impl Joined for Collisions {
+    fn join(&mut self, next: Self) {
+        match (self, next) {
+            (Self::Colliding { words, checked }, Self::Colliding { words: more, checked: count }) => {
+                words.extend(more);
+                *checked += count;
+            }
+            (Self::FirstHits(hits), Self::FirstHits(more)) => hits.extend(more),
+            (Self::Clearances(clearances), Self::Clearances(more)) => clearances.extend(more),
+            // One question is answered in one way.
+            (Self::Colliding { .. } | Self::FirstHits(_) | Self::Clearances(_), _) => {}
+        }
+    }
+
+    fn reserve(&mut self, elements: usize) {
+        match self {
+            Self::Colliding { words, .. } => words.reserve_exact(elements.div_ceil(64)),
+            Self::FirstHits(hits) => hits.reserve_exact(elements),
+            Self::Clearances(clearances) => clearances.reserve_exact(elements),
+        }
+    }
 }
 
 impl From<PlanningError> for ServiceError {

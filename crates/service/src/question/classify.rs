@@ -102,6 +102,10 @@ mod tests {
     struct ChangedBetween<'a>(&'a MultiResolutionMap, Cell<u64>);
 
     impl GiveWay for ChangedBetween<'_> {
+        fn is_due(&self) -> bool {
+            true
+        }
+
         fn give_way(&self) {
             let gone = self.0.view().voxels();
             let come: VoxelSet = VoxelKey::new([self.1.get() as i32, 0, 0]).into_iter().collect();

@@ -6,6 +6,7 @@ use super::planner_question::Question;
 use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
+use crate::work::check_not_stopped;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, Frontiers, STANDOFF_VOXELS,
@@ -84,8 +85,10 @@ impl Question for FrontierQuestion {
             standoff_m,
             cells_max: limits.frontier_cells_max,
         };
-        // It looks at all voxels of the box: never a short question.
-        map.in_view(&self.asked, usize::MAX, stop, |view| Ok(list_frontiers(view, &request, stop)?))
+        let mut view = map.pausing_view(&self.asked);
+        let frontiers = list_frontiers(&mut view, &request, stop)?;
+        check_not_stopped(stop)?;
+        Ok((frontiers, view.version()))
     }
 
     fn check_known(&self, _: &Frontiers, known: &KnownPart) -> Result<(), ServiceError> {

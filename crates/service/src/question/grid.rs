@@ -6,6 +6,7 @@ use super::planner_question::Question;
 use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
+use crate::work::check_not_stopped;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
 use mrol_map::util::StopSignal;
@@ -84,10 +85,11 @@ impl Question for GridQuestion {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Grid, ContentVersion), ServiceError> {
-        map.in_view(&self.asked, usize::MAX, stop, |view| {
-            let request = self.request(view.lattice(), Self::cells_max(limits));
-            Ok(project_grid(view, &request, stop)?)
-        })
+        let mut view = map.pausing_view(&self.asked);
+        let request = self.request(view.lattice(), Self::cells_max(limits));
+        let grid = project_grid(&mut view, &request, stop)?;
+        check_not_stopped(stop)?;
+        Ok((grid, view.version()))
     }
 
     fn check_known(&self, answer: &Grid, known: &KnownPart) -> Result<(), ServiceError> {

@@ -13,6 +13,7 @@ use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::map_service::MapService;
 use crate::watch::{Teller, stream_of};
+use crate::work::check_not_stopped;
 use mrol_map::map::{ContentVersion, MapName};
 use mrol_map::planning::{Grid, GridArea, GridExtent, GridRequest, grid_extent};
 use mrol_map::util::StopSignal;
@@ -202,10 +203,11 @@ impl Question for ExtentQuestion {
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(GridExtent, ContentVersion), ServiceError> {
-        map.in_view(&self.0.asked, usize::MAX, stop, |view| {
-            let request: GridRequest = self.0.request(view.lattice(), TILED_CELLS_MAX);
-            Ok(grid_extent(view, &request, stop)?)
-        })
+        let mut view = map.pausing_view(&self.0.asked);
+        let request: GridRequest = self.0.request(view.lattice(), TILED_CELLS_MAX);
+        let extent = grid_extent(&mut view, &request, stop)?;
+        check_not_stopped(stop)?;
+        Ok((extent, view.version()))
     }
 
     fn check_known(&self, _: &GridExtent, _: &KnownPart) -> Result<(), ServiceError> {

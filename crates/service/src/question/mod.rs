@@ -10,6 +10,7 @@ mod grid_tiles;
 mod known;
 mod motions;
 mod nearest;
+mod pieces;
 mod planner_question;
 mod poses;
 mod questioned_map;

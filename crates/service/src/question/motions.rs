@@ -5,14 +5,16 @@ use std::sync::Arc;
 use super::asked::Asked;
 use super::check::check_ignored;
 use super::known::KnownPart;
+use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
 use crate::error::ServiceError;
 use crate::limits::Limits;
-use crate::work::{check_not_stopped, ended_early};
+use crate::work::ended_early;
 use mrol_map::map::ContentVersion;
 use mrol_map::planning::{
-    Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings, prepared_bytes,
+    Before, Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings,
+    prepared_bytes,
 };
 use mrol_map::util::StopSignal;
 
@@ -79,7 +81,7 @@ impl Question for MotionCheck {
         stop: StopSignal<'_>,
     ) -> Result<(Vec<MotionAnswer>, ContentVersion), ServiceError> {
         let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
-        let question = MotionQuestion {
+        let all = MotionQuestion {
             body: &self.body,
             configurations,
             lengths: &self.lengths,
@@ -88,10 +90,20 @@ impl Question for MotionCheck {
             level: self.asked.level,
             surroundings: &self.surroundings,
         };
-        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
-        let answers = view.check_motions(&question, stop)?;
-        check_not_stopped(stop)?;
-        answers.map(|answers| (answers, view.version())).ok_or_else(|| ended_early(stop))
+        all.check_lengths()?;
+        let motions = self.lengths.len();
+        let view = || map.planning_view(&self.asked, &self.surroundings, stop);
+        let pieces = Pieces::of_large(motions, self.work_ns() / motions.max(1));
+        let mut first = 0;
+        pieces.answered(stop, view, |view, piece| {
+            let before = Before { configurations: first, motions: piece.start, ..Before::default() };
+            let lengths = &self.lengths[piece];
+            let end = first + lengths.iter().map(|length| *length as usize).sum::<usize>();
+            let part = MotionQuestion { configurations: configurations.part(first..end), lengths, ..all };
+            first = end;
+            let answers = view.check_motions(&part, stop).map_err(|error| error.behind(before))?;
+            answers.ok_or_else(|| ended_early(stop))
+        })
     }
 
     fn check_known(&self, answer: &Vec<MotionAnswer>, known: &KnownPart) -> Result<(), ServiceError> {

@@ -2,6 +2,7 @@
 
 use super::asked::Asked;
 use super::known::KnownPart;
+use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
@@ -62,9 +63,13 @@ impl Question for NearestQuestion {
         stop: StopSignal<'_>,
     ) -> Result<(NearestVoxels, ContentVersion), ServiceError> {
         let Self { asked, points, radius_m, to } = self;
-        let request =
-            NearestRequest { points: points.as_slice(), level: asked.level, radius_m: *radius_m, to: *to };
-        map.in_view(asked, points.len(), stop, |view| Ok(find_nearest(view, &request, stop)?))
+        let view = || map.whole_view(asked, points.len(), stop);
+        Pieces::of(points.len(), NS_EACH).answered(stop, view, |view, piece| {
+            let (before, points) = (piece.start, &points.as_slice()[piece]);
+            let request = NearestRequest { points, level: asked.level, radius_m: *radius_m, to: *to };
+            let nearest = find_nearest(&view.view, &request, stop);
+            Ok(nearest.map_err(|error| error.behind(before))?)
+        })
     }
 
     fn check_known(&self, answer: &NearestVoxels, known: &KnownPart) -> Result<(), ServiceError> {

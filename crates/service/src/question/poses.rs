@@ -5,13 +5,16 @@ use std::sync::Arc;
 use super::asked::Asked;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::known::KnownPart;
+use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
 use crate::error::ServiceError;
 use crate::limits::Limits;
-use crate::work::{check_not_stopped, ended_early};
+use crate::work::ended_early;
 use mrol_map::map::ContentVersion;
-use mrol_map::planning::{Body, Configurations, NUMBERS_PER_POSE, PoseQuestion, Surroundings};
+use mrol_map::planning::{
+    Before, Body, Configurations, NUMBERS_PER_POSE, PlanningError, PlanningView, PoseQuestion, Surroundings,
+};
 use mrol_map::util::StopSignal;
 
 /// Does a body fit at these configurations?
@@ -28,8 +31,33 @@ pub struct PoseCheck {
     /// How it is answered.
     pub answer: CheckAs,
 }
+
 /// How long a part of the body takes in a configuration, nanoseconds; a bit more than where it is asked for a bit.
 const NS_EACH: usize = 5;
+
+impl PoseCheck {
+    /// The answers to some of the configurations; none once stopped.
+    fn collisions(
+        &self,
+        view: &PlanningView<'_>,
+        configurations: Configurations<'_>,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Collisions>, PlanningError> {
+        let level = self.asked.level;
+        let question =
+            PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
+        Ok(match self.answer {
+            CheckAs::Colliding => view
+                .bodies_meet(&question, stop)?
+                .map(|words| Collisions::Colliding { words, checked: configurations.len() }),
+            CheckAs::FirstHit => view.first_hits(&question, stop)?.map(Collisions::FirstHits),
+            CheckAs::Clearance { most_m } => {
+                let most_m = clearance_most_m(view, level, most_m);
+                view.clearances(&question, most_m, stop)?.map(Collisions::Clearances)
+            }
+        })
+    }
+}
 
 impl Question for PoseCheck {
     type Answer = Collisions;
@@ -63,22 +91,13 @@ impl Question for PoseCheck {
         stop: StopSignal<'_>,
     ) -> Result<(Collisions, ContentVersion), ServiceError> {
         let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
-        let level = self.asked.level;
-        let question =
-            PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
-        let collisions = match self.answer {
-            CheckAs::Colliding => view
-                .bodies_meet(&question, stop)?
-                .map(|words| Collisions::Colliding { words, checked: configurations.len() }),
-            CheckAs::FirstHit => view.first_hits(&question, stop)?.map(Collisions::FirstHits),
-            CheckAs::Clearance { most_m } => {
-                let most_m = clearance_most_m(&view, level, most_m);
-                view.clearances(&question, most_m, stop)?.map(Collisions::Clearances)
-            }
-        };
-        check_not_stopped(stop)?;
-        collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| ended_early(stop))
+        let view = || map.planning_view(&self.asked, &self.surroundings, stop);
+        let pieces = Pieces::of(configurations.len(), self.body.parts().saturating_mul(NS_EACH));
+        pieces.answered(stop, view, |view, piece| {
+            let before = Before { configurations: piece.start, ..Before::default() };
+            let collisions = self.collisions(view, configurations.part(piece), stop);
+            collisions.map_err(|error| error.behind(before))?.ok_or_else(|| ended_early(stop))
+        })
     }
 
     fn check_known(&self, answer: &Collisions, known: &KnownPart) -> Result<(), ServiceError> {

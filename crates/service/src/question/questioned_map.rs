@@ -4,10 +4,11 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::asked::Asked;
+use super::pieces::WholeView;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::{TimeLimit, check_not_stopped, ended_early};
-use mrol_map::map::{ContentVersion, MapView, MultiResolutionMap};
+use mrol_map::map::{ContentVersion, MapView, MultiResolutionMap, PausingView};
 use mrol_map::planning::{Planner, PlanningView, Surroundings, Unknown};
 use mrol_map::util::StopSignal;
 
@@ -80,6 +81,28 @@ impl<'a> QuestionedMap<'a> {
         }
     }
 
+    /// A view of the whole map for a question of so many `elements`; where these are many, it keeps changes from beginning
+    /// meanwhile, so that no shorter question queues behind a change that waits for this one.
+    ///
+    /// # Errors
+    /// How the question was stopped: also where the view has to be waited for and must not be.
+    pub(super) fn whole_view(
+        &self,
+        asked: &Asked,
+        elements: usize,
+        stop: StopSignal<'_>,
+    ) -> Result<WholeView<'a>, ServiceError> {
+        let map: &'a MultiResolutionMap = self.map;
+        let _long_read = (elements > SHORT_ELEMENTS && self.may_wait).then(|| map.long_read());
+        let view = self.view(asked).ok_or_else(|| ended_early(stop))?;
+        Ok(WholeView { view, _long_read })
+    }
+
+    /// A view of the whole map for a question that takes long, which lets others go first between its parts.
+    pub(super) fn pausing_view(&self, asked: &Asked) -> PausingView<'a> {
+        PausingView::during(self.map.long_read(), !asked.ignore_keep_outs, true)
+    }
+
     /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`,
     /// changes are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for
     /// this one.
@@ -90,8 +113,7 @@ impl<'a> QuestionedMap<'a> {
         stop: StopSignal<'_>,
         f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
     ) -> Result<(A, ContentVersion), ServiceError> {
-        let _long_read = (elements > SHORT_ELEMENTS && self.may_wait).then(|| self.map.long_read());
-        let view = self.view(asked).ok_or_else(|| ended_early(stop))?;
+        let WholeView { view, _long_read } = self.whole_view(asked, elements, stop)?;
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))

@@ -2,6 +2,7 @@
 
 use super::asked::Asked;
 use super::known::KnownPart;
+use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
@@ -44,6 +45,8 @@ pub enum RaysToward {
 const BYTES_EACH: usize = 17;
 /// How long a ray takes, nanoseconds.
 const NS_EACH: usize = 300;
+/// The same where unknown voxels are met: rays of a few hundred voxels.
+const NS_EACH_IN_SIGHT: usize = 10_000;
 
 impl RayQuestion {
     fn rays(&self) -> Rays<'_> {
@@ -92,12 +95,20 @@ impl Question for RayQuestion {
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(RayHits, ContentVersion), ServiceError> {
-        map.in_view(&self.asked, self.elements(), stop, |view| {
-            let (rays, level) = (self.rays(), self.asked.level);
-            Ok(match self.unknown {
-                Unknown::Free => cast_rays(view, &rays, level, stop)?,
-                Unknown::Occupied => cast_rays_in_sight(view, &rays, level, stop)?,
-            })
+        let (rays, level) = (self.rays(), self.asked.level);
+        rays.checked()?;
+        let ns_each = match self.unknown {
+            Unknown::Free => NS_EACH,
+            Unknown::Occupied => NS_EACH_IN_SIGHT,
+        };
+        let view = || map.whole_view(&self.asked, self.elements(), stop);
+        Pieces::of(rays.len(), ns_each).answered(stop, view, |view, piece| {
+            let (before, part) = (piece.start, rays.part(piece));
+            let hits = match self.unknown {
+                Unknown::Free => cast_rays(&view.view, &part, level, stop),
+                Unknown::Occupied => cast_rays_in_sight(&view.view, &part, level, stop),
+            };
+            Ok(hits.map_err(|error| rays.error_behind(before, error))?)
         })
     }
 

@@ -3,13 +3,16 @@
 use super::asked::Asked;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::known::KnownPart;
+use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
 use super::questioned_map::QuestionedMap;
 use crate::error::ServiceError;
 use crate::limits::Limits;
-use crate::work::{check_not_stopped, ended_early};
+use crate::work::ended_early;
 use mrol_map::map::ContentVersion;
-use mrol_map::planning::{Sphere, SphereGroups, SphereQuestion, Surroundings};
+use mrol_map::planning::{
+    Before, PlanningError, PlanningView, Sphere, SphereGroups, SphereQuestion, Surroundings,
+};
 use mrol_map::util::StopSignal;
 
 /// Do these spheres of the map frame meet voxels?
@@ -28,8 +31,32 @@ pub struct SphereCheck {
     /// How it is answered.
     pub answer: CheckAs,
 }
+
 /// How long a sphere takes, nanoseconds.
 const NS_EACH: usize = 30;
+
+impl SphereCheck {
+    /// The answers to some of the groups, and how many they are; none once stopped.
+    fn collisions(
+        &self,
+        view: &PlanningView<'_>,
+        (groups, checked): (SphereGroups<'_>, usize),
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Collisions>, PlanningError> {
+        let (level, padding_m) = (self.asked.level, self.padding_m);
+        let question = SphereQuestion { groups, padding_m, level, surroundings: &self.surroundings };
+        Ok(match self.answer {
+            CheckAs::Colliding => {
+                view.spheres_meet(&question, stop)?.map(|words| Collisions::Colliding { words, checked })
+            }
+            CheckAs::FirstHit => view.first_sphere_hits(&question, stop)?.map(Collisions::FirstHits),
+            CheckAs::Clearance { most_m } => {
+                let most_m = clearance_most_m(view, level, most_m);
+                view.sphere_clearances(&question, most_m, stop)?.map(Collisions::Clearances)
+            }
+        })
+    }
+}
 
 impl Question for SphereCheck {
     type Answer = Collisions;
@@ -64,21 +91,16 @@ impl Question for SphereCheck {
         stop: StopSignal<'_>,
     ) -> Result<(Collisions, ContentVersion), ServiceError> {
         let groups = SphereGroups::new(&self.spheres, &self.sizes)?;
-        let (level, padding_m) = (self.asked.level, self.padding_m);
-        let question = SphereQuestion { groups, padding_m, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
-        let collisions = match self.answer {
-            CheckAs::Colliding => view
-                .spheres_meet(&question, stop)?
-                .map(|words| Collisions::Colliding { words, checked: self.sizes.len() }),
-            CheckAs::FirstHit => view.first_sphere_hits(&question, stop)?.map(Collisions::FirstHits),
-            CheckAs::Clearance { most_m } => {
-                let most_m = clearance_most_m(&view, level, most_m);
-                view.sphere_clearances(&question, most_m, stop)?.map(Collisions::Clearances)
-            }
-        };
-        check_not_stopped(stop)?;
-        collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| ended_early(stop))
+        let view = || map.planning_view(&self.asked, &self.surroundings, stop);
+        let of_group = self.spheres.len() / self.sizes.len().max(1);
+        let pieces = Pieces::of(self.sizes.len(), of_group.max(1).saturating_mul(NS_EACH));
+        pieces.answered(stop, view, |view, piece| {
+            let checked = piece.len();
+            let (groups, spheres) = groups.part(piece);
+            let collisions = self.collisions(view, (groups, checked), stop);
+            let before = Before { spheres, ..Before::default() };
+            collisions.map_err(|error| error.behind(before))?.ok_or_else(|| ended_early(stop))
+        })
     }
 
     fn check_known(&self, answer: &Collisions, known: &KnownPart) -> Result<(), ServiceError> {

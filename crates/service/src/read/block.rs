@@ -120,7 +120,11 @@ impl<M> Copy<M> {
         let long_read = map.long_read();
         let view = long_read.view();
         let _memory = reserve(view.selected_bytes_max(level, selection))?;
-        let (voxels, version) = (view.selected_blocks(level, selection, most, stop), view.version());
+        let (parts, version) = (view.selected_blocks(level, selection, most, stop), view.version());
+        drop(view);
+        drop(long_read);
+        // All of it is of one revision: the copy alone is made under the locks.
+        let voxels = parts.joined(stop);
         check_not_stopped(stop)?;
         Ok(Self { voxels, version, _memory })
     }

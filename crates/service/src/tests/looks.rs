@@ -214,6 +214,10 @@ fn a_block_and_a_count_are_made_with_looks_in_proportion_to_the_map_and_given_up
 struct Counted(Cell<usize>);
 
 impl GiveWay for Counted {
+    fn is_due(&self) -> bool {
+        true
+    }
+
     fn give_way(&self) {
         self.0.set(self.0.get() + 1);
     }

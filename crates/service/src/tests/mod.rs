@@ -4,3 +4,4 @@ mod looks;
 #[cfg(feature = "shuttle")]
 mod modeled;
 mod sleeping;
+mod turns;

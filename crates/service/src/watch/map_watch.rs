@@ -165,6 +165,7 @@ impl Watch {
                 if revision > head || stop.is_stopped() {
                     break;
                 }
+                stop.give_way();
                 let hash = recent.hashes_at(revision).map(|hashes| hashes.content);
                 let change = WatchedChange::of(revision, hash, change, Vec::new());
                 bytes += change.memory_bytes();

@@ -17,7 +17,7 @@ pub(crate) const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
 impl HostedMap {
     /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those
     /// who watch a region share it with those who watch everything.
-    pub(super) fn whole_state(
+    pub(crate) fn whole_state(
         &self,
         form: WatchForm,
         budget: &ResourceBudget,
@@ -40,11 +40,13 @@ impl HostedMap {
         let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
         // Lent while it is made; then it lies in memory, and is measured there.
         let _lent = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
-        let (voxels, version) = (view.level_blocks(level, stop), view.version());
+        let (parts, version) = (view.level_blocks(level, stop), view.version());
         let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         let viewpoints = view.viewpoints().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
+        // All of it is of one revision: the copy alone is made under the locks.
+        let voxels = parts.joined(stop);
         check_not_stopped(stop)?;
         let state = Arc::new(FullState { version, level, voxels, keep_outs, viewpoints });
         self.followers.whole_states.put(key, &state);

@@ -92,9 +92,9 @@ impl Lanes {
             recovery: of("recovery", of_searches, NICENESS, long_waiting, LARGE_PAUSED_MAX)?,
             undo: of("undo", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
             map_files: of("map_file", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
-            watch: of("watch", ONE_AT_A_TIME, 0, watches, 0)?,
+            watch: of("watch", ONE_AT_A_TIME, 0, watches, LARGE_PAUSED_MAX)?,
             observers: of("observers", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
-            blocks: of("blocks", of_queries, NICENESS, waiting, 0)?,
+            blocks: of("blocks", of_queries, NICENESS, waiting, LARGE_PAUSED_MAX)?,
             planning: of("planning", query_threads, 0, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
         })
     }

@@ -22,11 +22,16 @@ pub(super) struct Pauses<'a> {
 }
 
 impl GiveWay for Pauses<'_> {
+    fn is_due(&self) -> bool {
+        let held = self.held.borrow();
+        held.held_for() >= self.part && self.queue.may_pause(&held)
+    }
+
     fn give_way(&self) {
-        let mut held = self.held.borrow_mut();
-        if held.held_for() < self.part || !self.queue.may_pause(&held) {
+        if !self.is_due() {
             return;
         }
+        let mut held = self.held.borrow_mut();
         // Who takes the turn needs a thread of the system besides this one, which waits.
         if self.threads.have(self.queue.threads_wanted()).is_err() {
             return;

@@ -42,7 +42,7 @@ impl<'a> Transform<'a> {
                 self.occupy(&mut layer, *block, &part);
             }
             let rows = layer.measured();
-            for y in self.stop.paced(0..ys, self.rows_per_look()) {
+            for y in self.in_parts(0..ys) {
                 layers.lower(z * ys + y, rows, y..=y + both_margins, |row| row);
             }
             if self.stop.is_stopped() {
@@ -58,7 +58,7 @@ impl<'a> Transform<'a> {
         // Those of the same y together: they look at the same rows, which are then near.
         let rows = (0..ys).flat_map(|y| (0..zs).map(move |z| (y, z)));
         let mut least = Rows::far(1, xs);
-        for (y, z) in self.stop.paced(rows, self.rows_per_look()) {
+        for (y, z) in self.in_parts(rows) {
             least.clear(0);
             least.lower(0, layers, z..=z + 2 * self.margin, |layer| layer * ys + y);
             let row = &mut distances[(z * ys + y) * xs..][..xs];
@@ -69,8 +69,19 @@ impl<'a> Transform<'a> {
         (!self.stop.is_stopped()).then_some(())
     }
 
-    fn rows_per_look(&self) -> usize {
-        (STEPS_PER_LOOK / (self.size[0] * (2 * self.margin + 1))).max(1)
+    /// The rows, with a look at the signal before the first and before every so many more, where others go first; they end
+    /// once stopped. No lock is held meanwhile.
+    fn in_parts<I: Iterator>(&self, rows: I) -> impl Iterator<Item = I::Item> {
+        let per_look = (STEPS_PER_LOOK / (self.size[0] * (2 * self.margin + 1))).max(1);
+        let stop = self.stop;
+        let goes_on = move |at: usize| {
+            if !at.is_multiple_of(per_look) {
+                return true;
+            }
+            stop.give_way();
+            !stop.is_stopped()
+        };
+        rows.enumerate().take_while(move |(at, _)| goes_on(*at)).map(|(_, row)| row)
     }
 
     /// Occupies the voxels of a part of a block.

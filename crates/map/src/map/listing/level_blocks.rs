@@ -6,19 +6,31 @@ use crate::map::view::MapView;
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, Lattice, VoxelKey, VoxelSet};
 
+/// Voxels of a level as they were copied out of a map, with parts of one block apart: to be joined once the map is no longer
+/// locked.
+#[derive(Debug)]
+pub struct BlockParts(Vec<(VoxelKey, BlockMask)>);
+
+impl BlockParts {
+    /// The voxels, in blocks of 8 x 8 x 8 of them; once stopped, some of them. Lets other work go first meanwhile.
+    pub fn joined(self, stop: StopSignal<'_>) -> VoxelSet {
+        VoxelSet::of_blocks_giving_way(self.0, stop)
+    }
+}
+
 impl MapView<'_> {
-    /// All voxels of `level` that the view covers, in blocks of 8 x 8 x 8 of them; once stopped, some of them.
+    /// All voxels of `level` that the view covers; once stopped, some of them.
     ///
-    /// Takes 72 bytes a stored block meanwhile.
-    pub fn level_blocks(&self, level: u32, stop: StopSignal<'_>) -> VoxelSet {
+    /// Takes 72 bytes a stored block.
+    pub fn level_blocks(&self, level: u32, stop: StopSignal<'_>) -> BlockParts {
         let (_, up) = tier_of(level);
         let mut parts = Vec::with_capacity(self.lists(level).map(|list| list.blocks().len()).sum());
         let stored = self.lists(level).flat_map(|list| list.blocks().iter());
         parts.extend(stop.paced(stored, BLOCKS_PER_LOOK).map(|(block, mask)| coarsened(block, mask, up)));
-        VoxelSet::of_blocks_until(parts, stop)
+        BlockParts(parts)
     }
 
-    /// The selected voxels of `level` in blocks of 8 x 8 x 8 of them; some of them once stopped, or where there are more than
+    /// The selected voxels of `level`; some of them once stopped, or where there are more than
     /// `most` such blocks: then more than that.
     ///
     /// Takes [`MapView::selected_bytes_max`] meanwhile.
@@ -28,7 +40,7 @@ impl MapView<'_> {
         selection: &VoxelSelection,
         most: usize,
         stop: StopSignal<'_>,
-    ) -> VoxelSet {
+    ) -> BlockParts {
         let (_, up) = tier_of(level);
         // Of so many parts at most is one block made.
         let parts_max = most.saturating_mul(1 << (3 * up));
@@ -44,7 +56,7 @@ impl MapView<'_> {
                 }
             });
         }
-        VoxelSet::of_blocks_until(parts, stop)
+        BlockParts(parts)
     }
 
     /// Bytes of memory that [`MapView::selected_blocks`] takes at most.
@@ -125,7 +137,7 @@ mod tests {
             let settings = MapSettings::new(1.0, 6);
             let map = MultiResolutionMap::restore(settings, MapContents::at(1, voxels)).unwrap();
             let view = map.view();
-            let blocks = view.level_blocks(level, StopSignal::NEVER);
+            let blocks = view.level_blocks(level, StopSignal::NEVER).joined(StopSignal::NEVER);
             let expected: BTreeSet<VoxelKey> = view.lists(level).flat_map(|list| list.iter()).collect();
             prop_assert_eq!(blocks.iter().collect::<BTreeSet<_>>(), expected);
             let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turned.into());
@@ -142,11 +154,13 @@ mod tests {
                 prop_assert_eq!(&view.voxels_in(&region, level).into_iter().collect::<BTreeSet<_>>(), &expected);
                 let selection = VoxelSelection::from(Some(region));
                 let selected = view.selected_blocks(level, &selection, usize::MAX, StopSignal::NEVER);
+                let selected = selected.joined(StopSignal::NEVER);
                 prop_assert_eq!(view.count_voxels(level, &selection, StopSignal::NEVER), selected.len());
                 prop_assert_eq!(selected.iter().collect::<BTreeSet<_>>(), expected);
             }
             let everything = VoxelSelection::default();
-            prop_assert_eq!(&view.selected_blocks(level, &everything, usize::MAX, StopSignal::NEVER), &blocks);
+            let all = view.selected_blocks(level, &everything, usize::MAX, StopSignal::NEVER);
+            prop_assert_eq!(&all.joined(StopSignal::NEVER), &blocks);
             prop_assert_eq!(view.count_voxels(level, &everything, StopSignal::NEVER), blocks.len());
         }
 

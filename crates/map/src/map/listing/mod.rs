@@ -7,5 +7,5 @@ mod level_voxels;
 mod selected;
 
 pub(crate) use cell_bounds::CellBounds;
-pub use level_blocks::blocks_in;
+pub use level_blocks::{BlockParts, blocks_in};
 pub use level_voxels::LevelVoxels;

@@ -1,5 +1,7 @@
 //! Configurations: a pose for each link of a body.
 
+use std::ops::Range;
+
 use crate::geometry::QUATERNION_NORM_TOLERANCE;
 use crate::planning::error::PlanningError;
 
@@ -36,6 +38,13 @@ impl<'a> Configurations<'a> {
                 numbers: configurations.pose(pose / links, pose % links),
             }),
         }
+    }
+
+    /// Some of the configurations, by their numbers.
+    #[must_use]
+    pub fn part(self, of: Range<usize>) -> Self {
+        let numbers = self.links * NUMBERS_PER_POSE;
+        Self { numbers: &self.numbers[of.start * numbers..of.end * numbers], ..self }
     }
 
     /// Number of configurations.

@@ -164,7 +164,11 @@ impl MotionQuestion<'_> {
         self.lengths.iter().enumerate().map(motion).collect()
     }
 
-    fn check_lengths(&self) -> Result<(), PlanningError> {
+    /// Checks how many configurations the motions have.
+    ///
+    /// # Errors
+    /// For lengths that do not sum up to the configurations or are below two.
+    pub fn check_lengths(&self) -> Result<(), PlanningError> {
         const SHOWN: usize = 8;
         let sum: u64 = self.lengths.iter().map(|length| u64::from(*length)).sum();
         let configurations = self.configurations.len();

@@ -1,5 +1,7 @@
 //! Do these spheres of the map frame meet voxels?
 
+use std::ops::Range;
+
 use super::answer_kind::{AnswerKind, Clearances, FirstHits, Meets};
 use super::configuration::Configuration;
 use super::field_lookup::FieldLookup;
@@ -50,6 +52,15 @@ impl<'a> SphereGroups<'a> {
             Some(number) => Err(spheres[number].refused(SpherePlace::InGroups(number))),
             None => Ok(Self { spheres, sizes }),
         }
+    }
+
+    /// Some of the groups, by their numbers, and how many spheres those before them have.
+    #[must_use]
+    pub fn part(self, of: Range<usize>) -> (Self, usize) {
+        let count = |sizes: &[u32]| sizes.iter().map(|size| *size as usize).sum();
+        let before: usize = count(&self.sizes[..of.start]);
+        let sizes = &self.sizes[of];
+        (Self { spheres: &self.spheres[before..][..count(sizes)], sizes }, before)
     }
 
     fn iter(&self) -> impl Iterator<Item = &'a [Sphere]> {

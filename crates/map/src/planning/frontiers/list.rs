@@ -5,7 +5,7 @@ use super::frontier::Frontiers;
 use super::request::{FrontierError, FrontierRequest, STANDOFF_VOXELS, STANDOFF_VOXELS_MAX};
 use super::view_pose::Lookout;
 use super::window::{self, Window};
-use crate::map::MapView;
+use crate::map::PausingView;
 use crate::util::StopSignal;
 use crate::voxel::{INDEX_MAX, INDEX_MIN, Lattice};
 
@@ -20,23 +20,25 @@ const CELLS_MAX: usize = u32::MAX as usize / 32;
 /// far away as is asked for, or else no nearer to what ends the line than to the frontier, and rather on the side where
 /// nothing is unknown.
 ///
-/// The view must cover the whole map. Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Once stopped,
-/// some are missing.
+/// Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Others go first between its parts, so that parts of the box
+/// may be of later revisions than [`PausingView::version`]. Once stopped, some are missing.
 ///
 /// # Errors
 /// For corners that make no box, a box of too many voxels, and a distance out of range.
 pub fn list_frontiers(
-    view: &MapView<'_>,
+    view: &mut PausingView<'_>,
     request: &FrontierRequest,
     stop: StopSignal<'_>,
 ) -> Result<Frontiers, FrontierError> {
     let FrontierRequest { level, size_min, frontiers_max, .. } = *request;
-    let standoff_m = standoff_m(view, request)?;
-    let window = Window::of(view, level, ranges(view, request)?, stop);
-    let mut frontier = window.frontier();
+    let standoff_m = standoff_m(view.lattice(), request)?;
+    let ranges = ranges(view.lattice(), request)?;
+    let window = Window::of(view, level, ranges, stop);
+    let mut frontier = window.frontier(view, stop);
     let voxels_total = frontier.count();
     let mut clusters: Vec<Cluster> = Vec::new();
     while let Some(cluster) = frontier.take_cluster() {
+        view.give_way(stop);
         if stop.is_stopped() {
             break;
         }
@@ -46,28 +48,31 @@ pub fn list_frontiers(
     }
     // As they were found where they are as large.
     clusters.sort_by_key(|cluster| std::cmp::Reverse(cluster.len()));
-    let lookout = Lookout::new(view, level, standoff_m);
     let told = stop.paced(clusters.iter().take(frontiers_max), 1);
-    let frontiers = told.map(|cluster| window.told(cluster, &lookout)).collect();
+    let look = |cluster| {
+        view.give_way(stop);
+        window.told(cluster, &Lookout::new(view.view(), level, standoff_m))
+    };
+    let frontiers = told.map(look).collect();
     Ok(Frontiers { frontiers, frontiers_total: clusters.len() as u64, voxels_total })
 }
 
 /// The first and the last index of the voxels of the box, along each axis.
-fn ranges(view: &MapView<'_>, request: &FrontierRequest) -> Result<[[i32; 2]; 3], FrontierError> {
+fn ranges(lattice: &Lattice, request: &FrontierRequest) -> Result<[[i32; 2]; 3], FrontierError> {
     let FrontierRequest { level, min_m, max_m, cells_max, .. } = *request;
     let is_box =
         (0..3).all(|axis| min_m[axis] <= max_m[axis] && min_m[axis].is_finite() && max_m[axis].is_finite());
     if !is_box {
         return Err(FrontierError::Corners(min_m, max_m));
     }
-    let (low_m, end_m) = view.lattice().range_m();
+    let (low_m, end_m) = lattice.range_m();
     for (field, value) in [("min_m", min_m), ("max_m", max_m)] {
         if !value.iter().all(|c| (low_m..=end_m).contains(c)) {
             return Err(FrontierError::Range { field, value, min_m: low_m, end_m });
         }
     }
     let ranges: [[i32; 2]; 3] = std::array::from_fn(|axis| {
-        window::within_lattice(indices_in(view.lattice(), level, [min_m[axis], max_m[axis]]), level)
+        window::within_lattice(indices_in(lattice, level, [min_m[axis], max_m[axis]]), level)
     });
     let cells =
         ranges.iter().map(|[first, last]| (f64::from(*last) - f64::from(*first) + 1.0).max(0.0)).product();
@@ -91,8 +96,8 @@ fn indices_in(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32;
     [first, last]
 }
 
-fn standoff_m(view: &MapView<'_>, request: &FrontierRequest) -> Result<f64, FrontierError> {
-    let (level, voxel_m) = (request.level, view.lattice().resolution_m(request.level));
+fn standoff_m(lattice: &Lattice, request: &FrontierRequest) -> Result<f64, FrontierError> {
+    let (level, voxel_m) = (request.level, lattice.resolution_m(request.level));
     let max_m = STANDOFF_VOXELS_MAX * voxel_m;
     let standoff_m = request.standoff_m.unwrap_or(STANDOFF_VOXELS * voxel_m);
     let is_in_range = standoff_m > 0.0 && standoff_m <= max_m;

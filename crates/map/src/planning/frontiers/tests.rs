@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use proptest::prelude::*;
 
 use super::*;
-use crate::map::{KeepOuts, MapView};
+use crate::map::{KeepOuts, MapView, PausingView};
 use crate::planning::tests::{SeenMap, seen_history_and_level};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
@@ -109,15 +109,17 @@ proptest! {
         standoff in prop_oneof![Just(None), (0.2f64..4.0).prop_map(Some)],
     ) {
         let seen = history.map();
-        let view = seen.map.view().with_viewpoints().with_keep_outs();
+        let mut view = PausingView::from(seen.map.view().with_viewpoints().with_keep_outs());
         let voxel_m = seen.map.lattice().resolution_m(level);
         let high = std::array::from_fn(|axis| low[axis] + size[axis]);
         let standoff_m = standoff.map(|voxels| voxels * voxel_m);
         let request = FrontierRequest {
             level, min_m: low, max_m: high, size_min, frontiers_max: 1000, standoff_m, cells_max: 1_000_000,
         };
-        let told = list_frontiers(&view, &request, StopSignal::NEVER).unwrap();
-        let all = BruteForce { seen: &seen, view: &view, level };
+        let told = list_frontiers(&mut view, &request, StopSignal::NEVER).unwrap();
+        let first = FrontierRequest { frontiers_max: 2, ..request };
+        let some = list_frontiers(&mut view, &first, StopSignal::NEVER).unwrap();
+        let all = BruteForce { seen: &seen, view: view.view(), level };
         let voxels = all.frontier(low, high);
         prop_assert_eq!(told.voxels_total, voxels.len() as u64);
         let count = |all: &mut dyn Iterator<Item = Seen>| {
@@ -132,7 +134,6 @@ proptest! {
         prop_assert_eq!(told.frontiers_total, told.frontiers.len() as u64);
 
         // As many as are asked for, the first of them.
-        let some = list_frontiers(&view, &FrontierRequest { frontiers_max: 2, ..request }, StopSignal::NEVER).unwrap();
         prop_assert_eq!(&some.frontiers[..], &told.frontiers[..told.frontiers.len().min(2)]);
         prop_assert_eq!(some.frontiers_total, told.frontiers_total);
 
@@ -174,8 +175,9 @@ fn what_makes_no_box_or_distance_is_named() {
         standoff_m: None,
         cells_max: 1000,
     };
-    let ask =
-        |request: FrontierRequest| list_frontiers(&map.view().with_viewpoints(), &request, StopSignal::NEVER);
+    let ask = |request: FrontierRequest| {
+        list_frontiers(&mut map.view().with_viewpoints().into(), &request, StopSignal::NEVER)
+    };
     assert_eq!(ask(request), Ok(Frontiers::default()));
     assert_eq!(ask(FrontierRequest { max_m: [0.01; 3], ..request }), Ok(Frontiers::default()));
     let said = |request| ask(request).unwrap_err().to_string();
@@ -209,7 +211,7 @@ fn a_stopped_search_looks_at_the_signal_in_proportion_to_the_box() {
             standoff_m: None,
             cells_max: 10_000_000,
         };
-        list_frontiers(&map.view().with_viewpoints(), &request, StopSignal::when(&never)).unwrap();
+        list_frontiers(&mut map.view().with_viewpoints().into(), &request, StopSignal::when(&never)).unwrap();
         looks.get()
     };
     assert!(looks(6.4) >= 4 * looks(3.2), "{} and {}", looks(6.4), looks(3.2));

@@ -3,7 +3,7 @@
 use super::clusters::{Bits, Cluster, FrontierBits};
 use super::frontier::Frontier;
 use super::view_pose::Lookout;
-use crate::map::{KeepOut, MapView};
+use crate::map::{KeepOut, MapView, PausingView};
 use crate::planning::unknown::{ALL, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey};
@@ -31,7 +31,14 @@ pub(super) fn within_lattice([first, last]: [i32; 2], level: u32) -> [i32; 2] {
 
 impl<'a> Window<'a> {
     /// What is known of the voxels of `level` in `ranges` of indices and around them; of some of them once stopped.
-    pub(super) fn of(view: &'a MapView<'_>, level: u32, ranges: [[i32; 2]; 3], stop: StopSignal<'_>) -> Self {
+    ///
+    /// Others go first between its parts.
+    pub(super) fn of(
+        view: &mut PausingView<'a>,
+        level: u32,
+        ranges: [[i32; 2]; 3],
+        stop: StopSignal<'_>,
+    ) -> Self {
         let is_empty = ranges.iter().any(|[first, last]| first > last);
         let size = ranges.map(|[first, last]| if is_empty { 0 } else { (last - first + 3) as usize });
         let count = size.iter().product();
@@ -44,8 +51,7 @@ impl<'a> Window<'a> {
         window
     }
 
-    fn fill(&mut self, view: &MapView<'_>, ranges: [[i32; 2]; 3], stop: StopSignal<'_>) {
-        let mut free_space = FreeSpace::of(view);
+    fn fill(&mut self, view: &mut PausingView<'_>, ranges: [[i32; 2]; 3], stop: StopSignal<'_>) {
         let around = ranges.map(|[first, last]| {
             within_lattice([first.saturating_sub(1), last.saturating_add(1)], self.level)
         });
@@ -56,8 +62,14 @@ impl<'a> Window<'a> {
                 move |y| xs.clone().map(move |x| [x, y, z])
             })
         });
-        for block in stop.paced(blocks, BLOCKS_PER_STOP_CHECK).filter_map(VoxelKey::new) {
-            self.fill_block(view, block, around, &mut free_space);
+        let mut blocks = blocks.peekable();
+        while blocks.peek().is_some() && !stop.is_stopped() {
+            view.give_way(stop);
+            let view = view.view();
+            let mut free_space = FreeSpace::of(view);
+            for block in blocks.by_ref().take(BLOCKS_PER_STOP_CHECK).filter_map(VoxelKey::new) {
+                self.fill_block(view, block, around, &mut free_space);
+            }
         }
     }
 
@@ -121,11 +133,14 @@ impl<'a> Window<'a> {
         })
     }
 
-    /// The voxels of the box that are free with an unknown one beside them.
-    pub(super) fn frontier(&self) -> FrontierBits {
+    /// The voxels of the box that are free with an unknown one beside them. Others go first between its layers.
+    pub(super) fn frontier(&self, view: &mut PausingView<'_>, stop: StopSignal<'_>) -> FrontierBits {
         let mut frontier = Bits::new(self.size.iter().product());
         let inside = |axis: usize| 1..self.size[axis].saturating_sub(1);
         for (z, y) in inside(2).flat_map(|z| inside(1).map(move |y| (z, y))) {
+            if y == 1 {
+                view.give_way(stop);
+            }
             for x in inside(0) {
                 let place = (z * self.size[1] + y) * self.size[0] + x;
                 let is_frontier = self.free.get(place)

@@ -3,7 +3,7 @@
 use super::project::cells_of;
 use super::projection::Projection;
 use super::request::{GridError, GridRequest};
-use crate::map::MapView;
+use crate::map::PausingView;
 use crate::util::StopSignal;
 
 /// The cells of a grid. Cell (i, j) spans [i, i + 1) * `cell_m` in x and [j, j + 1) * `cell_m` in y of the map frame.
@@ -26,12 +26,12 @@ pub struct GridExtent {
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.
 pub fn grid_extent(
-    view: &MapView<'_>,
+    view: &mut PausingView<'_>,
     request: &GridRequest,
     stop: StopSignal<'_>,
 ) -> Result<GridExtent, GridError> {
-    let projection = Projection::of(view, request)?;
-    let cells = cells_of(&projection, request, stop)?;
+    let projection = Projection::of(view.lattice(), request)?;
+    let cells = cells_of(&projection, view, request, stop)?;
     Ok(GridExtent {
         cell_m: projection.cell_m,
         cell_voxels: projection.cell_voxels,

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use super::cells::Cells;
 use super::occupancy_grid::Grid;
 use super::projection::Projection;
+use crate::map::{MapView, PausingView};
 use crate::planning::unknown::{CELLS, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
@@ -16,39 +17,85 @@ const BOXES_PER_STOP_CHECK: usize = 4096;
 /// Columns of a block.
 const COLUMNS: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
 
-impl Projection<'_> {
-    /// Which cells of `grid`, which are `cells`, are free.
-    pub(super) fn free_cells(&self, cells: &Cells, grid: &Grid, stop: StopSignal<'_>) -> Vec<u64> {
+/// What is looked at with, for as long as nobody else is to go first.
+struct Look<'a> {
+    view: &'a MapView<'a>,
+    free_space: FreeSpace<'a>,
+    stop: StopSignal<'a>,
+}
+
+/// How many blocks were looked at.
+struct Looks(usize);
+
+impl Projection {
+    /// Which cells of `grid`, which are `cells`, are free. Others go first between the stacks of blocks.
+    pub(super) fn free_cells(
+        &self,
+        view: &mut PausingView<'_>,
+        cells: &Cells,
+        grid: &Grid,
+        stop: StopSignal<'_>,
+    ) -> Vec<u64> {
         let mut columns = vec![0u32; grid.cells()];
-        let mut free_space = FreeSpace::of(self.view);
-        let [xs, ys, zs] = self.blocks_in_reach(cells, stop);
-        let mut looked = 0;
-        'stacks: for (x, y) in xs.flat_map(|x| ys.clone().map(move |y| (x, y))) {
-            let mut is_seen = [false; COLUMNS];
-            for z in zs.clone() {
-                looked += 1;
-                if looked % BLOCKS_PER_STOP_CHECK == 0 && stop.is_stopped() {
-                    break 'stacks;
-                }
-                let Some(block) = VoxelKey::new([x, y, z]) else { continue };
-                if self.may_be_seen(block) {
-                    // A block that many looked into takes a while.
-                    if stop.is_stopped() {
-                        break 'stacks;
-                    }
-                    self.look_at(block, &mut is_seen, &mut free_space);
-                }
-            }
-            for (column, _) in is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen) {
-                let at = [column as i64 % i64::from(BLOCK_SIDE), column as i64 / i64::from(BLOCK_SIDE)];
-                let cell = |axis: usize| {
-                    (i64::from([x, y][axis]) * i64::from(BLOCK_SIDE) + at[axis]).div_euclid(self.cell_voxels)
+        let [xs, ys, zs] = self.blocks_in_reach(view.view(), cells, stop);
+        let mut stacks = xs.flat_map(|x| ys.clone().map(move |y| [x, y])).peekable();
+        let mut looks = Looks(0);
+        while stacks.peek().is_some() {
+            view.give_way(stop);
+            let mut look = Look { view: view.view(), free_space: FreeSpace::of(view.view()), stop };
+            for stack in stacks.by_ref() {
+                let Some(is_seen) = self.look_at_stack(stack, zs.clone(), &mut look, &mut looks) else {
+                    return self.free_of(&columns, grid);
                 };
-                if let Some(number) = cells.number([cell(0), cell(1)]) {
-                    columns[number] += 1;
+                for (column, _) in is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen) {
+                    if let Some(number) = cells.number(self.cell_of(stack, column)) {
+                        columns[number] += 1;
+                    }
+                }
+                if stop.is_way_due() {
+                    break;
                 }
             }
         }
+        self.free_of(&columns, grid)
+    }
+
+    /// The cell that a column of a stack of blocks lies in.
+    fn cell_of(&self, stack: [i32; 2], column: usize) -> [i64; 2] {
+        let at = [column as i64 % i64::from(BLOCK_SIDE), column as i64 / i64::from(BLOCK_SIDE)];
+        std::array::from_fn(|axis| {
+            (i64::from(stack[axis]) * i64::from(BLOCK_SIDE) + at[axis]).div_euclid(self.cell_voxels)
+        })
+    }
+
+    /// The columns of a stack of blocks that have a free voxel in the band; none once stopped.
+    fn look_at_stack(
+        &self,
+        [x, y]: [i32; 2],
+        zs: RangeInclusive<i32>,
+        look: &mut Look<'_>,
+        Looks(looks): &mut Looks,
+    ) -> Option<[bool; COLUMNS]> {
+        let mut is_seen = [false; COLUMNS];
+        for z in zs {
+            *looks += 1;
+            if looks.is_multiple_of(BLOCKS_PER_STOP_CHECK) && look.stop.is_stopped() {
+                return None;
+            }
+            let Some(block) = VoxelKey::new([x, y, z]) else { continue };
+            if self.may_be_seen(look.view, block) {
+                // A block that many looked into takes a while.
+                if look.stop.is_stopped() {
+                    return None;
+                }
+                self.look_at(block, &mut is_seen, look);
+            }
+        }
+        Some(is_seen)
+    }
+
+    /// The cells of which all columns are free, by how many are.
+    fn free_of(&self, columns: &[u32], grid: &Grid) -> Vec<u64> {
         let all = u64::try_from(self.cell_voxels * self.cell_voxels).unwrap_or(u64::MAX);
         let mut free = vec![0u64; grid.cells().div_ceil(64)];
         for (number, &seen) in columns.iter().enumerate() {
@@ -59,28 +106,31 @@ impl Projection<'_> {
     }
 
     /// Notes the columns of a block that have a free voxel in the band.
-    fn look_at(&self, block: VoxelKey, is_seen: &mut [bool; COLUMNS], free_space: &mut FreeSpace<'_>) {
-        let occupied = self.view.level_block(self.level, block);
+    fn look_at(&self, block: VoxelKey, is_seen: &mut [bool; COLUMNS], look: &mut Look<'_>) {
+        let occupied = look.view.level_block(self.level, block);
         for cell in (0..CELLS).map(Cell::from_bits).filter(|cell| !occupied.contains(*cell, 0)) {
             let (voxel, [x, y, _]) = (cell.voxel(block), cell.index());
             let column = &mut is_seen[x + y * BLOCK_SIDE as usize];
             if !*column && (self.band[0]..=self.band[1]).contains(&voxel.index()[2]) {
-                *column = free_space.is_seen_through(voxel, self.level);
+                *column = look.free_space.is_seen_through(voxel, self.level);
             }
         }
     }
 
     /// True where a viewpoint may have looked into a block.
-    fn may_be_seen(&self, block: VoxelKey) -> bool {
+    fn may_be_seen(&self, view: &MapView<'_>, block: VoxelKey) -> bool {
         let side_m = self.voxel_m * f64::from(BLOCK_SIDE);
         let low_m = block.index().map(|i| f64::from(i) * side_m);
-        self.view
-            .viewpoints()
-            .is_some_and(|viewpoints| viewpoints.may_look_into(low_m, low_m.map(|c| c + side_m)))
+        view.viewpoints().is_some_and(|viewpoints| viewpoints.may_look_into(low_m, low_m.map(|c| c + side_m)))
     }
 
     /// The blocks of the area and the band, as far as any viewpoint looked: their indices along each axis.
-    fn blocks_in_reach(&self, cells: &Cells, stop: StopSignal<'_>) -> [RangeInclusive<i32>; 3] {
+    fn blocks_in_reach(
+        &self,
+        view: &MapView<'_>,
+        cells: &Cells,
+        stop: StopSignal<'_>,
+    ) -> [RangeInclusive<i32>; 3] {
         let block =
             |voxel: i64| (voxel >> BLOCK_LEVELS).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         let area = |axis: usize| {
@@ -90,7 +140,7 @@ impl Projection<'_> {
         };
         let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
         let (mut low_m, mut high_m) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let boxes_m = self.view.viewpoints().into_iter().flat_map(|viewpoints| viewpoints.boxes_m());
+        let boxes_m = view.viewpoints().into_iter().flat_map(|viewpoints| viewpoints.boxes_m());
         for [low, high] in stop.paced(boxes_m, BOXES_PER_STOP_CHECK) {
             low_m = std::array::from_fn(|axis| low_m[axis].min(low[axis]));
             high_m = std::array::from_fn(|axis| high_m[axis].max(high[axis]));

@@ -5,7 +5,7 @@ use super::keep_outs;
 use super::occupancy_grid::Grid;
 use super::projection::Projection;
 use super::request::{GridArea, GridError, GridRequest};
-use crate::map::MapView;
+use crate::map::PausingView;
 use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;
 
@@ -25,36 +25,38 @@ use crate::util::StopSignal;
 /// neither are unknown.
 ///
 /// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a
-/// cell, and 4 more where cells are told apart. The view must cover the whole map. Once stopped, the grid lacks voxels.
+/// cell, and 4 more where cells are told apart. Others go first between its parts, so that parts of the grid may be of later
+/// revisions than [`PausingView::version`]. Once stopped, the grid lacks voxels.
 ///
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.
 pub fn project_grid(
-    view: &MapView<'_>,
+    view: &mut PausingView<'_>,
     request: &GridRequest,
     stop: StopSignal<'_>,
 ) -> Result<Grid, GridError> {
-    let projection = Projection::of(view, request)?;
-    let cells = cells_of(&projection, request, stop)?;
-    let mut grid = projection.grid(&cells, stop);
-    if let Some(shapes) = Shapes::of(view) {
+    let projection = Projection::of(view.lattice(), request)?;
+    let cells = cells_of(&projection, view, request, stop)?;
+    let mut grid = projection.grid(view, &cells, stop);
+    if let Some(shapes) = Shapes::of(view.view()) {
         keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
     }
     if request.tells_unknown {
-        grid.free = Some(projection.free_cells(&cells, &grid, stop));
+        grid.free = Some(projection.free_cells(view, &cells, &grid, stop));
     }
     Ok(grid)
 }
 
 /// The cells of the grid that is asked for.
 pub(super) fn cells_of(
-    projection: &Projection<'_>,
+    projection: &Projection,
+    view: &mut PausingView<'_>,
     request: &GridRequest,
     stop: StopSignal<'_>,
 ) -> Result<Cells, GridError> {
     let cells = match request.area {
         GridArea::Rectangle { min_m, max_m } => Cells::of_rectangle(min_m, max_m, projection.cell_m),
-        GridArea::Occupied => projection.occupied_cells(stop),
+        GridArea::Occupied => projection.occupied_cells(view, stop),
     };
     let count = cells.size(0) as f64 * cells.size(1) as f64;
     if count > request.cells_max as f64 {

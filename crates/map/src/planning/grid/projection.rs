@@ -3,13 +3,12 @@
 use super::cells::{Cells, whole};
 use super::occupancy_grid::Grid;
 use super::request::{GridArea, GridError, GridRequest};
-use crate::map::{MapView, Region, VoxelSelection};
+use crate::map::{PausingView, Region, SHARDS, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey};
 
-/// A request that was checked, with the view that answers it.
-pub(super) struct Projection<'a> {
-    pub(super) view: &'a MapView<'a>,
+/// A request that was checked.
+pub(super) struct Projection {
     pub(super) level: u32,
     pub(super) voxel_m: f64,
     /// Voxels along a cell's side.
@@ -19,49 +18,42 @@ pub(super) struct Projection<'a> {
     pub(super) band: [i32; 2],
 }
 
-impl<'a> Projection<'a> {
-    pub(super) fn of(view: &'a MapView<'a>, request: &GridRequest) -> Result<Self, GridError> {
+impl Projection {
+    pub(super) fn of(lattice: &Lattice, request: &GridRequest) -> Result<Self, GridError> {
         let GridRequest { level, area, band_m, cell_m, .. } = *request;
         if let GridArea::Rectangle { min_m, max_m } = area {
             let is_ordered = (0..2).all(|axis| min_m[axis] <= max_m[axis]);
             if !is_ordered || !min_m.iter().chain(&max_m).all(|c| c.is_finite()) {
                 return Err(GridError::Rectangle(min_m, max_m));
             }
-            check_range("min_m", min_m, view.lattice())?;
-            check_range("max_m", max_m, view.lattice())?;
+            check_range("min_m", min_m, lattice)?;
+            check_range("max_m", max_m, lattice)?;
         }
         let is_in_order = band_m[0] <= band_m[1];
         if !is_in_order {
             return Err(GridError::Band(band_m));
         }
-        let (min_m, end_m) = view.lattice().range_m();
+        let (min_m, end_m) = lattice.range_m();
         if band_m[1] < min_m || band_m[0] >= end_m {
             return Err(GridError::BandRange { band_m, min_m, end_m });
         }
-        let voxel_m = view.lattice().resolution_m(level);
+        let voxel_m = lattice.resolution_m(level);
         let cell_voxels =
             whole(cell_m / voxel_m).filter(|voxels| (1.0..=f64::from(INDEX_MAX)).contains(voxels));
         let cell_voxels = cell_voxels.ok_or(GridError::Cell { cell_m, voxel_m })?;
         let band = band_of(voxel_m, band_m);
-        Ok(Self {
-            view,
-            level,
-            voxel_m,
-            cell_voxels: cell_voxels as i64,
-            cell_m: cell_voxels * voxel_m,
-            band,
-        })
+        Ok(Self { level, voxel_m, cell_voxels: cell_voxels as i64, cell_m: cell_voxels * voxel_m, band })
     }
 
     /// The smallest rectangle with all cells that have a voxel in the band.
-    pub(super) fn occupied_cells(&self, stop: StopSignal<'_>) -> Cells {
+    pub(super) fn occupied_cells(&self, view: &mut PausingView<'_>, stop: StopSignal<'_>) -> Cells {
         let [low_m, high_m] = self.heights_m();
         let everywhere = Region::Box {
             min_m: [f64::NEG_INFINITY, f64::NEG_INFINITY, low_m],
             max_m: [f64::INFINITY, f64::INFINITY, high_m],
         };
         let mut cells: Option<Cells> = None;
-        self.for_each_voxel(&everywhere, stop, |cell, _| {
+        self.for_each_voxel(view, &everywhere, stop, |cell, _| {
             let cells = cells.get_or_insert(Cells { first: cell, end: cell });
             for (axis, at) in cell.into_iter().enumerate() {
                 cells.first[axis] = cells.first[axis].min(at);
@@ -71,11 +63,11 @@ impl<'a> Projection<'a> {
         cells.unwrap_or(Cells::NONE)
     }
 
-    pub(super) fn grid(&self, cells: &Cells, stop: StopSignal<'_>) -> Grid {
+    pub(super) fn grid(&self, view: &mut PausingView<'_>, cells: &Cells, stop: StopSignal<'_>) -> Grid {
         let size = [0, 1].map(|axis| cells.size(axis) as usize);
         let count = size[0] * size[1];
         let (mut occupied, mut tops_m) = (vec![0u64; count.div_ceil(64)], vec![f32::NAN; count]);
-        self.for_each_voxel(&cells.region(self.cell_m, self.heights_m()), stop, |cell, z| {
+        self.for_each_voxel(view, &cells.region(self.cell_m, self.heights_m()), stop, |cell, z| {
             if let Some(number) = cells.number(cell) {
                 occupied[number / 64] |= 1 << (number % 64);
                 // The larger of the two, NaN passed over.
@@ -98,12 +90,22 @@ impl<'a> Projection<'a> {
         [first * self.voxel_m, (last + 1.0) * self.voxel_m]
     }
 
-    /// Calls `f` with the cell and the height's index of each voxel of the band in the blocks that meet `region`.
-    fn for_each_voxel(&self, region: &Region, stop: StopSignal<'_>, mut f: impl FnMut([i64; 2], i32)) {
+    /// Calls `f` with the cell and the height's index of each voxel of the band in the blocks that meet `region`. Others go
+    /// first between the shards.
+    fn for_each_voxel(
+        &self,
+        view: &mut PausingView<'_>,
+        region: &Region,
+        stop: StopSignal<'_>,
+        mut f: impl FnMut([i64; 2], i32),
+    ) {
         let selection = VoxelSelection::from(Some(*region));
-        for list in self.view.lists(self.level) {
+        for shard in 0..SHARDS {
+            view.give_way(stop);
+            let view = view.view();
+            let Some(list) = view.lists(self.level).nth(shard) else { continue };
             let up = list.levels_up();
-            self.view.for_each_block(&list, &selection, stop, |block: VoxelKey, mask: &BlockMask| {
+            view.for_each_block(&list, &selection, stop, |block: VoxelKey, mask: &BlockMask| {
                 for cell in mask.cells(up) {
                     let [x, y, z] = cell.voxel(block).ancestor(up).index();
                     if (self.band[0]..=self.band[1]).contains(&z) {

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+use crate::map::{MapContents, MapSettings, MultiResolutionMap, PausingView};
 use crate::planning::tests::{RESOLUTION_M, history_and_level, seen_history_and_level};
 use crate::util::StopSignal;
 use crate::voxel::{VoxelKey, VoxelSet};
@@ -13,7 +13,7 @@ fn map_of(indices: &[[i32; 3]], resolution_m: f64) -> MultiResolutionMap {
 }
 
 fn project(map: &MultiResolutionMap, request: &GridRequest) -> Result<Grid, GridError> {
-    project_grid(&map.view(), request, StopSignal::NEVER)
+    project_grid(&mut map.view().into(), request, StopSignal::NEVER)
 }
 
 const REQUEST: GridRequest = GridRequest {
@@ -114,8 +114,8 @@ proptest! {
         let cell_m = f64::from(cell_voxels) * voxel_m;
         let area = GridArea::Rectangle { min_m: low, max_m: std::array::from_fn(|axis| low[axis] + size[axis]) };
         let request = GridRequest { level, area, band_m, cell_m, tells_unknown: true, cells_max: 1_000_000 };
-        let view = seen.map.view().with_viewpoints();
-        let grid = project_grid(&view, &request, StopSignal::NEVER).unwrap();
+        let mut view = PausingView::from(seen.map.view().with_viewpoints());
+        let grid = project_grid(&mut view, &request, StopSignal::NEVER).unwrap();
         let free = grid.free.as_ref().unwrap();
         let first = grid.origin_m.map(|c| (c / voxel_m).round() as i32);
         // Nobody sees further than this.
@@ -125,7 +125,7 @@ proptest! {
             let column_is_free = |x: i32, y: i32| (-far..far).any(|z| {
                 let voxel = VoxelKey::new([first[0] + cell[0] + x, first[1] + cell[1] + y, z]).unwrap();
                 let height = seen.map.lattice().center_m(voxel, level)[2];
-                reaches_into(band_m, height, voxel_m) && seen.is_free(&view, voxel, level)
+                reaches_into(band_m, height, voxel_m) && seen.is_free(view.view(), voxel, level)
             });
             let side = 0..cell_voxels as i32;
             let all = side.clone().all(|y| side.clone().all(|x| column_is_free(x, y)));

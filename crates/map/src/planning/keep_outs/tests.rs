@@ -248,8 +248,8 @@ proptest! {
         let area = GridArea::Rectangle { min_m: [-12.0; 2], max_m: [12.0; 2] };
         let cell_m = f64::from(side) * RESOLUTION_M;
         let request = GridRequest { level: 0, area, band_m: [low, low + height], cell_m, tells_unknown: false, cells_max: 10_000 };
-        let of_voxels = project_grid(&map.view(), &request, NEVER).unwrap();
-        let told = project_grid(&map.view().with_keep_outs(), &request, NEVER).unwrap();
+        let of_voxels = project_grid(&mut map.view().into(), &request, NEVER).unwrap();
+        let told = project_grid(&mut map.view().with_keep_outs().into(), &request, NEVER).unwrap();
         prop_assert_eq!(told.tops_m.iter().map(|top| top.to_bits()).collect::<Vec<_>>(), of_voxels.tops_m.iter().map(|top| top.to_bits()).collect::<Vec<_>>());
         let keep_outs = map.keep_outs();
         for number in 0..told.cells() {

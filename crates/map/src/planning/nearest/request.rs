@@ -60,3 +60,14 @@ pub enum NearestError {
         level: u32,
     },
 }
+
+impl NearestError {
+    /// The error of some of the points as one of all of them, of which so many come before.
+    #[must_use]
+    pub fn behind(self, before: usize) -> Self {
+        match self {
+            Self::Point(error) => Self::Point(OutOfRange { at: error.at + before, ..error }),
+            Self::Radius { .. } => self,
+        }
+    }
+}

@@ -29,6 +29,20 @@ impl RayHits {
         }
     }
 
+    /// Takes the answers of those that follow; it has those of whole words of bits itself.
+    pub fn append(&mut self, mut next: Self) {
+        debug_assert!(self.len().is_multiple_of(64), "bits begin with a word");
+        let (before, after) = (self.len(), self.len() + next.len());
+        if !(self.keep_outs.is_empty() && next.keep_outs.is_empty()) {
+            self.keep_outs.resize(before, None);
+            self.keep_outs.append(&mut next.keep_outs);
+            self.keep_outs.resize(after, None);
+        }
+        self.hit.append(&mut next.hit);
+        self.distances_m.append(&mut next.distances_m);
+        self.voxels.append(&mut next.voxels);
+    }
+
     /// Number of rays.
     pub fn len(&self) -> usize {
         self.distances_m.len()

@@ -1,5 +1,7 @@
 //! Rays as a caller asks for them: where they begin, and where they lead.
 
+use std::ops::Range;
+
 use crate::geometry::Point;
 
 /// How far the length of a direction may lie from one before it is refused instead of normalized.
@@ -119,8 +121,37 @@ impl<'a> Rays<'a> {
         self.len() == 0
     }
 
+    /// Some of the rays, by their numbers.
+    #[must_use]
+    pub fn part(self, of: Range<usize>) -> Self {
+        let toward = match self.toward {
+            Toward::Directions { directions, range_m } => {
+                Toward::Directions { directions: &directions[of.clone()], range_m }
+            }
+            Toward::Ends(ends) => Toward::Ends(&ends[of.clone()]),
+        };
+        Self { origins: if self.origins.len() == 1 { self.origins } else { &self.origins[of] }, toward }
+    }
+
+    /// The error of a part of the rays as one of all of them, of which so many come before the part.
+    pub fn error_behind(&self, before: usize, mut error: RayError) -> RayError {
+        match &mut error {
+            RayError::Origin { .. } if self.origins.len() == 1 => {}
+            RayError::Origin { at, .. }
+            | RayError::Direction { at, .. }
+            | RayError::EndRange { at, .. }
+            | RayError::Leaves { at, .. }
+            | RayError::End { at, .. } => *at += before,
+            RayError::Origins { .. } | RayError::Range(_) => {}
+        }
+        error
+    }
+
     /// Checks what concerns all rays.
-    pub(super) fn checked(&self) -> Result<(), RayError> {
+    ///
+    /// # Errors
+    /// Where the origins are neither one nor as many as rays, or the range is no number above 0.
+    pub fn checked(&self) -> Result<(), RayError> {
         let (origins, rays) = (self.origins.len(), self.len());
         if origins != 1 && origins != rays {
             return Err(RayError::Origins { origins, rays });

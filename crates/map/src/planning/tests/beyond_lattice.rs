@@ -182,10 +182,11 @@ fn points_rays_and_boxes_beyond_the_lattice_are_refused() {
             assert!(told.starts_with("ends[1]"), "{told}");
         }
     }
+    drop(view);
     let grid = |band_m, area| {
         let request =
             GridRequest { level: 0, area, band_m, cell_m: 0.1, tells_unknown: true, cells_max: 1000 };
-        project_grid(&view, &request, NEVER)
+        project_grid(&mut map.view().with_viewpoints().into(), &request, NEVER)
     };
     let area = GridArea::Rectangle { min_m: [0.0; 2], max_m: [1.0; 2] };
     for band_m in [[1100.0, 1101.0], [-2e3, -1.9e3], [f64::INFINITY; 2]] {
@@ -203,7 +204,7 @@ fn points_rays_and_boxes_beyond_the_lattice_are_refused() {
             standoff_m: None,
             cells_max: 1_000_000,
         };
-        list_frontiers(&view, &request, NEVER)
+        list_frontiers(&mut map.view().with_viewpoints().into(), &request, NEVER)
     };
     for (min_m, max_m) in [([1100.0; 3], [1101.0; 3]), ([1048.5, 0.0, 0.0], [1048.6, 0.1, 0.1])] {
         refused(frontiers(min_m, max_m).unwrap_err().to_string(), "box:");

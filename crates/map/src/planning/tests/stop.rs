@@ -153,7 +153,7 @@ fn seen_from_afar() -> MultiResolutionMap {
 #[test]
 fn a_grid_of_what_was_seen_from_afar_ends_when_it_is_stopped_and_keeps_no_list_of_it() {
     let map = seen_from_afar();
-    let view = map.view().with_viewpoints();
+    let mut view = map.view().with_viewpoints().into();
     // Some 10^11 blocks were looked into: a list of them is no answer.
     let area = GridArea::Rectangle { min_m: [0.0; 2], max_m: [20.0; 2] };
     let request = GridRequest {
@@ -166,7 +166,7 @@ fn a_grid_of_what_was_seen_from_afar_ends_when_it_is_stopped_and_keeps_no_list_o
     };
     let looks = Cell::new(0);
     let stops = || looks.replace(looks.get() + 1) >= 40;
-    let _some = project_grid(&view, &request, StopSignal::when(&stops)).unwrap();
+    let _some = project_grid(&mut view, &request, StopSignal::when(&stops)).unwrap();
     assert!((40..=60).contains(&looks.get()), "{} looks of which 40 let it go on", looks.get());
 }
 
