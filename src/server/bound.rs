@@ -15,7 +15,7 @@ use super::background::keep_house;
 use super::endpoint::Endpoint;
 use super::files::Warnings;
 use super::listener::{Accepting, TcpSocket};
-use super::opening::{Opening, panicked};
+use super::opening::{Opening, Wanted, panicked};
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::starting::{CLOSING_MAX, Starting};
@@ -30,7 +30,6 @@ use crate::middleware::Middleware;
 use crate::telemetry::{Audit, Metrics, RequestRecorder};
 use crate::{grpc, http};
 use mrol_service::{Gauges, MapService, Observer, ServiceSettings};
-use mrol_store::OpeningProgress;
 
 /// The least time for saving the maps at the end: also who waits for no request wants them saved.
 const SAVING_MIN: Duration = Duration::from_secs(5);
@@ -51,7 +50,7 @@ pub struct Server {
     grpc: TcpSocket,
     http_socket: Option<UnixSocket>,
     grpc_socket: Option<UnixSocket>,
-    progress: OpeningProgress,
+    wanted: Wanted,
 }
 
 impl Server {
@@ -79,19 +78,17 @@ impl Server {
         let observers: Vec<Arc<dyn Observer>> = vec![Arc::new(metrics.clone()), Arc::new(audit.clone())];
         let settings = ServiceSettings { gauges: Some(gauges), observers, ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
-        let progress = OpeningProgress::default();
+        let wanted = Wanted::default();
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
-        let routes = http::starting(progress.clone(), access.clone());
+        let routes = http::starting(wanted.progress().clone(), access.clone());
         let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
-        let until_found = CancelOpening(Some(progress.clone()));
         let begin = {
-            let progress = progress.clone();
+            let progress = wanted.progress().clone();
             move || MapService::begin(settings, &progress)
         };
         let begun = tokio::task::spawn_blocking(begin).await;
         starting.end().await;
         let service = begun.map_err(|panic| panicked(&panic))?.map_err(ServerError::Open)?;
-        until_found.passed();
         Ok(Self {
             service,
             recorder: RequestRecorder::new(metrics, audit),
@@ -102,7 +99,7 @@ impl Server {
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
             http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
-            progress,
+            wanted,
             config,
         })
     }
@@ -161,7 +158,10 @@ impl Server {
     /// a disk may hang. A thread of the runtime is then in its hands, so that the runtime has to be left behind
     /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, access, tls, service, recorder, lifecycle, progress, .. } = &self;
+        let files = self.files();
+        let Self { config, access, tls, service, recorder, lifecycle, wanted, .. } = self;
+        let (http_tcp, http_unix, grpc_tcp, grpc_unix) =
+            (self.http, self.http_socket, self.grpc, self.grpc_socket);
         let metrics = recorder.metrics().clone();
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
@@ -174,8 +174,6 @@ impl Server {
         let grpc = endpoint(Protocol::Grpc, routes.into_axum_router());
         let http = endpoint(Protocol::Http, router);
 
-        let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
-        let files = self.files();
         let mut shutdown = pin!(shutdown);
         tokio::select! {
             () = measure(&service, &metrics) => {}
@@ -184,8 +182,9 @@ impl Server {
                 return Ok(());
             }
         }
-        let mut opening = Opening::begin(service.clone(), progress.clone(), health).await;
-        let mut accepting = self.accept(&grpc, &http);
+        let mut opening = Opening::begin(service.clone(), wanted, health).await;
+        tracing::info!(http = %http_tcp.address, grpc = %grpc_tcp.address, "serving");
+        let mut accepting = accept([(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)]);
         let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
         let looking = tokio::spawn(files.look_after(lifecycle.clone()));
         let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
@@ -230,40 +229,19 @@ impl Server {
         tracing::info!(maps, "saved, ending");
         ended
     }
-
-    /// Takes connections from now on, at every socket.
-    fn accept(self, grpc: &Endpoint, http: &Endpoint) -> JoinSet<()> {
-        tracing::info!(http = %self.http.address, grpc = %self.grpc.address, "serving");
-        let mut accepting = JoinSet::new();
-        for (endpoint, tcp, unix) in
-            [(grpc, self.grpc, self.grpc_socket), (http, self.http, self.http_socket)]
-        {
-            accepting.spawn(endpoint.clone().accept(Accepting::Tcp(tcp.listener)));
-            if let Some(socket) = unix {
-                tracing::info!(protocol = endpoint.protocol.as_str(), socket = %socket.file.path().display(), "serving");
-                accepting.spawn(endpoint.clone().accept(Accepting::Unix(socket)));
-            }
-        }
-        accepting
-    }
 }
 
-/// Ends the search for maps where nobody waits for it any more.
-struct CancelOpening(Option<OpeningProgress>);
-
-impl CancelOpening {
-    /// The maps were found.
-    fn passed(mut self) {
-        self.0 = None;
-    }
-}
-
-impl Drop for CancelOpening {
-    fn drop(&mut self) {
-        if let Some(progress) = &self.0 {
-            progress.cancel();
+/// Takes connections from now on, at every socket.
+fn accept(sockets: [(&Endpoint, TcpSocket, Option<UnixSocket>); 2]) -> JoinSet<()> {
+    let mut accepting = JoinSet::new();
+    for (endpoint, tcp, unix) in sockets {
+        accepting.spawn(endpoint.clone().accept(Accepting::Tcp(tcp.listener)));
+        if let Some(socket) = unix {
+            tracing::info!(protocol = endpoint.protocol.as_str(), socket = %socket.file.path().display(), "serving");
+            accepting.spawn(endpoint.clone().accept(Accepting::Unix(socket)));
         }
     }
+    accepting
 }
 
 /// How long saving the maps may take when the server goes down.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use reqwest::StatusCode;
 use serde_json::json;
+use tokio::task::JoinSet;
 use tonic::transport::Endpoint;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_client::HealthClient;
@@ -122,6 +123,49 @@ async fn more_maps_whose_disks_hang_than_are_opened_at_once_keep_no_other_from_b
     let told = client().get(of(&hanging[0])).send().await.unwrap();
     assert_eq!(told.status(), StatusCode::SERVICE_UNAVAILABLE);
     assert_eq!(json_of(told).await["reason"], "catalog_busy");
+    server.signal("TERM");
+    code_at_end(server).await.expect("it ends by itself");
+}
+
+/// Those who wait for a map whose disk hangs are a share of all requests, and of each caller: the others are told so at once, and
+/// other maps are served.
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_for_a_map_whose_disk_hangs_keep_none_for_other_maps_out() {
+    const REQUESTS_MAX: usize = 16;
+    let data = tempfile::tempdir().unwrap();
+    let server = Process::start(data.path().to_str().unwrap(), &[]);
+    for name in ["well", "hangs"] {
+        let map = format!("{}/v1/maps/{name}", server.http);
+        client().put(&map).json(&json!({"resolution_m": 0.1})).send().await.unwrap();
+    }
+    assert_eq!(server.stop(), Some(0));
+    for file in fs::read_dir(folder_of(data.path(), "hangs")).unwrap().map(|file| file.unwrap().path()) {
+        fs::remove_file(&file).unwrap();
+        make_hang(&file);
+    }
+
+    let mut serve = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    serve.args(["serve", "--json", "--data-dir", data.path().to_str().unwrap(), "--drain-seconds", "1"]);
+    serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0", "--log-level", "error"]);
+    serve.env("MROL_LIMITS__REQUESTS_MAX", REQUESTS_MAX.to_string());
+    let server = Process::of(serve);
+    let map = |name: &str| client().get(format!("{}/v1/maps/{name}", server.http)).send();
+    assert_eq!(map("well").await.unwrap().status(), StatusCode::OK);
+    // Of three quarters of all requests one caller has half; who is refused hears it while the others wait.
+    let waiting = REQUESTS_MAX * 3 / 4 / 2;
+    let mut asked = JoinSet::new();
+    // So many at a time that those who are refused find a place in work.
+    for more in [2 * waiting, REQUESTS_MAX - waiting] {
+        (0..more).for_each(|_| drop(asked.spawn(map("hangs"))));
+        while asked.len() > waiting {
+            let refused = asked.join_next().await.unwrap().unwrap().unwrap();
+            assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+            assert_eq!(refused.headers()["retry-after"], "1");
+            assert_eq!(json_of(refused).await["reason"], "catalog_busy");
+        }
+    }
+    assert_eq!(map("well").await.unwrap().status(), StatusCode::OK);
+    assert!(asked.try_join_next().is_none(), "they wait still");
     server.signal("TERM");
     code_at_end(server).await.expect("it ends by itself");
 }

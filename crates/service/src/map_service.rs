@@ -36,8 +36,6 @@ pub struct MapService {
 pub(super) struct Inner {
     pub(super) settings: ServiceSettings,
     pub(super) catalog: Arc<Catalog>,
-    /// How far the maps of the data folder are opened.
-    pub(super) opening: OpeningProgress,
     pub(super) lanes: Lanes,
     pub(super) budget: Arc<ResourceBudget>,
 }
@@ -63,8 +61,7 @@ impl MapService {
         settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
         settings.filter.checked()?;
         let inner = Inner {
-            catalog: Catalog::find_maps(settings.data_dir.as_deref(), &settings.store, progress)?.into(),
-            opening: progress.clone(),
+            catalog: Catalog::find_maps(&settings, progress)?.into(),
             lanes: Lanes::start(&settings)?,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
@@ -201,7 +198,7 @@ impl MapService {
 
     /// The map of that name, which is opened where it sleeps.
     pub(super) async fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
-        self.inner.catalog.get(&self.allowed_maps.check(name)?).await
+        self.inner.catalog.get(&self.allowed_maps.check(name)?, &self.asker).await
     }
 }
 

@@ -36,11 +36,11 @@ impl MapService {
             if is_new {
                 self.inner.budget.check_to_grow()?;
             }
-            let inner = Arc::clone(&self.inner);
+            let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
             let create = async move {
                 let _empty =
                     is_new.then(|| inner.budget.reserve(settings.first_filter_bytes())).transpose()?;
-                inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
+                inner.catalog.create(name, settings, inner.settings.limits.maps_max, &asker).await
             };
             let (map, created) = run_to_completion(create).await?;
             Ok((describe_made(map).await?, created))
@@ -126,7 +126,7 @@ impl MapService {
     /// Once the progress with which the service was begun is cancelled.
     pub fn open_maps(&self) -> Result<(), ServiceError> {
         let (inner, sleeps) = (&self.inner, self.inner.settings.sleep_after.is_some());
-        inner.catalog.open_all(&inner.opening, |name| {
+        inner.catalog.open_all(|name| {
             if sleeps {
                 inner.catalog.put_to_sleep(name, Duration::ZERO, &inner.budget);
             }
@@ -135,7 +135,7 @@ impl MapService {
 
     /// How far the maps of the data folder are opened; none once that is done.
     pub fn opening(&self) -> Option<Opened> {
-        (!self.inner.catalog.are_open()).then(|| self.inner.opening.opened())
+        self.inner.catalog.opening()
     }
 
     /// Saves the maps that nobody has asked for for `sleep_after`, and that nobody uses or watches, and takes them out of
@@ -163,8 +163,9 @@ impl MapService {
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
         let work = async {
-            let (inner, name) = (Arc::clone(&self.inner), self.allowed_maps.check(name)?);
-            run_to_completion(async move { inner.catalog.delete(&name).await }).await
+            let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
+            let name = self.allowed_maps.check(name)?;
+            run_to_completion(async move { inner.catalog.delete(&name, &asker).await }).await
         };
         let outcome = |version: &_| Outcome::Changed(Change::of_map(Some(*version), None));
         self.observed("DeleteMap", Some(name), work, outcome).await.map(drop)
@@ -215,9 +216,9 @@ impl MapService {
             let build =
                 move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
             let built = self.inner.lanes.map_files.run(&self.asker, build).await??;
-            let inner = Arc::clone(&self.inner);
+            let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
             let maps_max = self.limits().maps_max;
-            let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
+            let restore = async move { inner.catalog.restore(name, built, maps_max, replace, &asker).await };
             let (before, map) = run_to_completion(restore).await?;
             Ok((before, describe_made(map).await?))
         };

@@ -12,12 +12,14 @@ use uuid::Uuid;
 use super::built_map::BuiltMap;
 use super::hosted_map::HostedMap;
 use super::named::{Named, Place};
-use super::opening::{find_all, maps_at_once, not_stored};
+use super::opening::{find_all, maps_at_once, not_stored, waiting_within};
+use super::same_settings::same_settings;
 use crate::caller::{AllowedMaps, Reachable};
 use crate::commit::CommitThreads;
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::request::{MapVersion, UnavailableMap};
-use mrol_map::bloom::FilterSettings;
+use crate::settings::ServiceSettings;
+use crate::work::{Asker, Shares};
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::sync::{Rank, RwLock};
 use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
@@ -34,6 +36,8 @@ pub(crate) struct Catalog {
     pub(super) commit_threads: Arc<CommitThreads>,
     /// How many maps requests open at once.
     pub(super) openings: Arc<Semaphore>,
+    /// Requests that wait for maps that are opened.
+    pub(super) waiting: Arc<Shares>,
     /// How often a request opened a map that slept.
     pub(super) wakes: AtomicU64,
     /// How far the maps that were there at the start are opened.
@@ -44,14 +48,14 @@ pub(crate) struct Catalog {
 }
 
 impl Catalog {
-    /// Finds the maps of `data_dir`, none of which is open yet; without a folder, nothing outlives the process.
+    /// Finds the maps of the data folder, none of which is open yet; without a folder, nothing outlives the process.
     pub(crate) fn find_maps(
-        data_dir: Option<&Path>,
-        settings: &StoreSettings,
+        settings: &ServiceSettings,
         progress: &OpeningProgress,
     ) -> Result<Self, ServiceError> {
+        let ServiceSettings { data_dir, store: settings, limits, .. } = settings;
         let open = |path: &Path| DataDir::open(path, settings.clone());
-        let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
+        let data_dir = data_dir.as_deref().map(open).transpose().map_err(not_stored)?;
         let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
         let maps = maps.unwrap_or_default();
         Ok(Self {
@@ -61,6 +65,7 @@ impl Catalog {
             settings: settings.clone(),
             commit_threads: CommitThreads::start()?,
             openings: Arc::new(Semaphore::new(maps_at_once())),
+            waiting: waiting_within(limits.requests_max),
             wakes: AtomicU64::new(0),
             progress: progress.clone(),
             writing: Default::default(),
@@ -91,8 +96,12 @@ impl Catalog {
     }
 
     /// The map of that name; none where the name is free.
-    async fn find(self: &Arc<Self>, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
-        match self.get(name).await {
+    async fn find(
+        self: &Arc<Self>,
+        name: &Reachable,
+        asker: &Asker,
+    ) -> Result<Option<Arc<HostedMap>>, ServiceError> {
+        match self.get(name, asker).await {
             Ok(map) => Ok(Some(map)),
             Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
             Err(error) => Err(error),
@@ -139,14 +148,15 @@ impl Catalog {
         name: Reachable,
         settings: MapSettings,
         maps_max: usize,
+        asker: &Asker,
     ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
         // One that is there already waits for nobody's disk.
-        let found = self.find(&name).await?;
+        let found = self.find(&name, asker).await?;
         if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
         }
         let _writing = self.turn_to_write().await?;
-        let found = self.find(&name).await?;
+        let found = self.find(&name, asker).await?;
         if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
         }
@@ -163,14 +173,15 @@ impl Catalog {
         built: BuiltMap,
         maps_max: usize,
         replace: bool,
+        asker: &Asker,
     ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
         // Whoever has the turn waits for no map that is opened.
         if replace {
-            self.find(&name).await?;
+            self.find(&name, asker).await?;
         }
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
-        let old = self.find(&name).await?;
+        let old = self.find(&name, asker).await?;
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
         let build = move || Ok(map);
@@ -251,11 +262,15 @@ impl Catalog {
     }
 
     /// Takes a map out; its last version.
-    pub(crate) async fn delete(self: &Arc<Self>, name: &Reachable) -> Result<MapVersion, ServiceError> {
+    pub(crate) async fn delete(
+        self: &Arc<Self>,
+        name: &Reachable,
+        asker: &Asker,
+    ) -> Result<MapVersion, ServiceError> {
         // Whoever has the turn waits for no map that is opened.
-        self.get(name).await?;
+        self.get(name, asker).await?;
         let _writing = self.turn_to_write().await?;
-        let map = self.get(name).await?;
+        let map = self.get(name, asker).await?;
         let folder = map.folder.clone();
         let removed =
             self.on_disk(move |data_dir| folder.map_or(Ok(()), |folder| data_dir.remove(&folder))).await;
@@ -333,28 +348,6 @@ pub(super) async fn blocking<T: Send + 'static>(
     done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
 }
 
-/// Making a map again as it is changes nothing; as another it is a conflict.
-fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<HostedMap>, ServiceError> {
-    let there = map.map.settings();
-    if *there == settings {
-        return Ok(map);
-    }
-    let (there, wanted) = (description(there), description(&settings));
-    let message = format!("map {} exists with {there}, not with {wanted}", map.name);
-    Err(ServiceError::new(Reason::MapExists, message))
-}
-
-/// All settings of a map as text.
-fn description(settings: &MapSettings) -> String {
-    let MapSettings { resolution_m, levels, filter, moments, origin } = settings;
-    let filter = filter.map_or("no filter".to_owned(), |FilterSettings { hashes, bits_per_key }| {
-        format!("filter_hashes {hashes}, filter_bits_per_key {bits_per_key}")
-    });
-    let moments = if *moments { "moments" } else { "no moments" };
-    let origin = origin.map_or(String::new(), |origin| format!(", origin_m {:?}", origin.position_m));
-    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}{origin}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -385,18 +378,18 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
         let progress = OpeningProgress::default();
-        let catalog = Catalog::find_maps(None, &StoreSettings::default(), &progress).unwrap();
+        let catalog = Catalog::find_maps(&ServiceSettings::default(), &progress).unwrap();
         let catalog = Arc::new(catalog);
-        let settings = MapSettings::new(0.1, 4);
-        catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
+        let (settings, one) = (MapSettings::new(0.1, 4), Asker::default());
+        catalog.create(named("there"), settings, MAPS_MAX, &one).await.unwrap();
         let turn = catalog.writing.lock().await;
         let busy = Reason::CatalogBusy;
-        assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX)).await, busy);
-        assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
-        assert_eq!(told(catalog.delete(&named("there"))).await, busy);
+        assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX, &one)).await, busy);
+        assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false, &one)).await, busy);
+        assert_eq!(told(catalog.delete(&named("there"), &one)).await, busy);
         // What is there already waits for nobody.
-        assert!(!catalog.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
+        assert!(!catalog.create(named("there"), settings, MAPS_MAX, &one).await.unwrap().1);
         drop(turn);
-        assert!(catalog.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
+        assert!(catalog.create(named("new"), settings, MAPS_MAX, &one).await.unwrap().1);
     }
 }

@@ -18,6 +18,7 @@ mod newcomers;
 mod opening;
 mod replacing;
 mod robots;
+mod same_settings;
 mod saving;
 mod sleeping;
 mod snapshots;

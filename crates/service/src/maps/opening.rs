@@ -1,4 +1,5 @@
-//! The maps of a data folder at a start: those that can be opened, and why the others cannot.
+//! The maps of a data folder at a start: those that can be opened, and why the others cannot; how many are opened at once, and how
+//! many requests may wait for that.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -7,8 +8,13 @@ use super::asleep::Asleep;
 use super::named::Named;
 use super::snapshots::thin;
 use crate::error::{Reason, ServiceError};
+use crate::work::Shares;
 use mrol_map::map::MapName;
 use mrol_store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError};
+
+/// Of `requests_max`, the share that may wait for maps that are opened: the rest is left for other maps. One caller may have half of
+/// that wait, which is as many as it may have in work by default.
+const WAITING_SHARE: [usize; 2] = [3, 4];
 
 /// Finds the maps of a data folder; none of them is open yet.
 pub(super) fn find_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result<Named, ServiceError> {
@@ -39,6 +45,12 @@ pub(super) fn find_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result
 /// Maps that are opened at once, or saved at the end: it is work for the CPU, and waits for the disk between.
 pub(crate) fn maps_at_once() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).max(2)
+}
+
+/// The places of requests that wait for maps that are opened, where so many are in work at once.
+pub(super) fn waiting_within(requests_max: usize) -> Arc<Shares> {
+    let [part, whole] = WAITING_SHARE;
+    Arc::new(Shares::new((requests_max.saturating_mul(part) / whole).max(1)))
 }
 
 /// Opens one map, and says what was found of it; `folders` are those that claim to be it, where they were listed before.

@@ -23,6 +23,7 @@ use crate::caller::{AllowedMaps, Reachable};
 use crate::error::{Reason, ServiceError};
 use crate::request::{MapInfo, MapsAwake};
 use crate::resources::ResourceBudget;
+use crate::work::Asker;
 use mrol_map::map::MapName;
 use mrol_map::util::StopSignal;
 use mrol_store::{OpeningProgress, StoreError};
@@ -30,6 +31,8 @@ use tokio::time::timeout;
 
 /// How long a request waits for a map that is opened.
 pub(super) const OPENING_MAX: Duration = Duration::from_secs(10);
+/// When who found no place among those who wait may try again.
+const RETRY: Duration = Duration::from_secs(1);
 /// How long a map that is opened keeps others from being opened, where all places are taken.
 const PLACE_MAX: Duration = Duration::from_secs(5);
 
@@ -37,14 +40,23 @@ impl Catalog {
     /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one is given up.
     ///
     /// A disk that hangs under a map keeps nobody waiting for ever, and no other map from being opened: after
-    /// [`PLACE_MAX`] its place goes to another.
-    pub(crate) async fn get(self: &Arc<Self>, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
+    /// [`PLACE_MAX`] its place goes to another. Nor do those who wait for it keep requests for other maps out: they are a
+    /// share of all requests, of one asker as many as places are left.
+    pub(crate) async fn get(
+        self: &Arc<Self>,
+        name: &Reachable,
+        asker: &Asker,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let mut waiting = None;
         loop {
             let place = self.look_up(name)?;
             let asleep = match place {
                 Place::Awake(map) => return Ok(map),
                 Place::Asleep(asleep) => asleep,
             };
+            if waiting.is_none() {
+                waiting = Some(self.waiting.take(asker).ok_or_else(|| too_many_wait(name.name()))?);
+            }
             // A request that waits holds no thread.
             let opened = timeout(OPENING_MAX, Arc::clone(self).open_for_request(name.name().clone(), asleep));
             opened.await.unwrap_or_else(|_| Err(still_opening(name.name())))?;
@@ -178,6 +190,14 @@ impl Catalog {
         let (awake, asleep) = (maps.open.len(), maps.asleep.len());
         MapsAwake { awake, asleep, wakes: self.wakes.load(Ordering::Relaxed) }
     }
+}
+
+/// A map that is opened, for which too many wait already.
+fn too_many_wait(name: &MapName) -> ServiceError {
+    let message = format!(
+        "map {name} is being opened, and as many requests wait for maps that are opened as may: they keep none for other maps          out; try again"
+    );
+    ServiceError::new(Reason::CatalogBusy, message).retry_after(RETRY)
 }
 
 /// A map whose opening takes longer than anybody waits for.

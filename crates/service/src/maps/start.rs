@@ -9,7 +9,7 @@ use super::opening::{maps_at_once, not_stored};
 use super::sleeping::OPENING_MAX;
 use crate::error::{Reason, ServiceError};
 use mrol_map::map::MapName;
-use mrol_store::{Opened, OpeningProgress, StoreError};
+use mrol_store::{Opened, StoreError};
 use tokio::time::timeout;
 
 impl Catalog {
@@ -17,12 +17,8 @@ impl Catalog {
     /// other back. `opened` is called of each. Waits for the disk.
     ///
     /// # Errors
-    /// `Cancelled` once the opening was cancelled.
-    pub(crate) fn open_all(
-        &self,
-        progress: &OpeningProgress,
-        opened: impl Fn(&MapName) + Sync,
-    ) -> Result<(), ServiceError> {
+    /// `Cancelled` once the progress with which the catalog was made was cancelled.
+    pub(crate) fn open_all(&self, opened: impl Fn(&MapName) + Sync) -> Result<(), ServiceError> {
         let all: Vec<_> =
             self.maps.read().asleep.iter().map(|(name, it)| (name.clone(), Arc::clone(it))).collect();
         let count = maps_at_once().min(all.len());
@@ -32,7 +28,7 @@ impl Catalog {
                 let next = rest.lock().next();
                 let Some((name, asleep)) = next else { return Ok(()) };
                 let opening = Arc::clone(&asleep.opening).blocking_lock_owned();
-                let is_new = self.open_asleep(&name, &asleep, progress)?;
+                let is_new = self.open_asleep(&name, &asleep, &self.progress)?;
                 drop(opening);
                 // Or a request was faster.
                 if is_new {
@@ -61,9 +57,9 @@ impl Catalog {
         })
     }
 
-    /// True once every map of the data folder was opened, or could not be.
-    pub(crate) fn are_open(&self) -> bool {
-        *self.are_open.borrow()
+    /// How far the maps of the data folder are opened; none once each was opened, or could not be.
+    pub(crate) fn opening(&self) -> Option<Opened> {
+        (!*self.are_open.borrow()).then(|| self.progress.opened())
     }
 }
 
