@@ -1,5 +1,7 @@
 //! Ends: where ascents ended, with what is known beforehand and what rays say for and against each.
 
+use std::cmp::Ordering;
+
 use nalgebra::Vector3;
 
 use super::agreement::{RayAgreement, Rays, Rival};
@@ -102,15 +104,10 @@ impl<'a> Ends<'a> {
         }
     }
 
-    /// Sorts the ends: first those at which the scan and earlier scans saw enough of each other, by the smaller share
-    /// of rays that agree; then the others, by overlap. Of those that `is_same_place` says are one place, the first is
-    /// kept.
+    /// Sorts the ends by [`in_rank`]. Of those that `is_same_place` says are one place, the first is kept.
     pub(super) fn rank(&mut self, is_same_place: impl Fn(&Pose, &Pose) -> bool) {
-        let known = |end: &End| has_evidence(&end.agreement).then(|| end.agreement.worse());
-        self.all.sort_by(|a, b| {
-            let by_rays = known(b).unwrap_or(-1.0).total_cmp(&known(a).unwrap_or(-1.0));
-            by_rays.then(b.fit.overlap().total_cmp(&a.fit.overlap()))
-        });
+        let rank = |end: &End| (end.agreement, end.fit.overlap());
+        self.all.sort_by(|a, b| in_rank(&rank(a), &rank(b)));
         let mut places: Vec<Pose> = Vec::new();
         self.all.retain(|End { fit, .. }| {
             let is_new = !places.iter().any(|place| is_same_place(place, &fit.map_from_sensor));
@@ -283,8 +280,38 @@ fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
     a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
+/// The order of places that a search found, each with how rays agree there and its overlap: first those at which the scan
+/// and earlier scans saw enough of each other, by the smaller share of rays that agree; then the others, by overlap.
+fn in_rank(
+    (rays, overlap): &(RayAgreement, f64),
+    (of_other, overlap_of_other): &(RayAgreement, f64),
+) -> Ordering {
+    let share = |rays: &RayAgreement| if has_evidence(rays) { rays.worse() } else { -1.0 };
+    share(of_other).total_cmp(&share(rays)).then(overlap_of_other.total_cmp(overlap))
+}
+
 /// [`End::cost`] of a pose that is so many standard deviations from the guess.
 fn cost(deviations: f64, look: &Look, preferred: &Look) -> f64 {
     let z = look.contradicted_more_than(preferred).max(0.0);
     deviations * deviations + z * z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::agreement::RayCounts;
+
+    #[test]
+    fn places_are_ranked_by_the_rays_that_agree_and_by_overlap_where_nothing_is_known() {
+        let place = |agree: usize, contradicted: usize, overlap: f64| {
+            let counts = |agree, contradicted| RayCounts { asked: 800, agree, contradicted };
+            (RayAgreement { of_scan: counts(agree, 0), of_map: counts(agree, contradicted) }, overlap)
+        };
+        let (agreed, contradicted) = (place(700, 10, 0.3), place(700, 70, 0.9));
+        let (unseen_dense, unseen_sparse) = (place(30, 0, 0.95), place(30, 0, 0.5));
+        let of_less_overlap = place(700, 10, 0.2);
+        let mut places = [unseen_sparse, of_less_overlap, contradicted, unseen_dense, agreed];
+        places.sort_by(in_rank);
+        assert_eq!(places, [agreed, of_less_overlap, contradicted, unseen_dense, unseen_sparse]);
+    }
 }
