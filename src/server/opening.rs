@@ -32,8 +32,8 @@ pub(super) struct Opening {
 }
 
 impl Opening {
-    /// Begins to open the maps of `service`, which was begun with the progress of `wanted`. Where there are none, the server is
-    /// healthy at once.
+    /// Begins to open the maps of `service`, which was begun with the progress of `wanted`. Where there are none, the
+    /// server is healthy at once.
     pub(super) async fn begin(service: MapService, wanted: Wanted, health: Health) -> Self {
         match service.opening() {
             None => health.set_serving().await,

@@ -127,8 +127,8 @@ async fn more_maps_whose_disks_hang_than_are_opened_at_once_keep_no_other_from_b
     code_at_end(server).await.expect("it ends by itself");
 }
 
-/// Those who wait for a map whose disk hangs are a share of all requests, and of each caller: the others are told so at once, and
-/// other maps are served.
+/// Those who wait for a map whose disk hangs are a share of all requests, and of each caller: the others are told so at
+/// once, and other maps are served.
 #[tokio::test(flavor = "multi_thread")]
 async fn requests_for_a_map_whose_disk_hangs_keep_none_for_other_maps_out() {
     const REQUESTS_MAX: usize = 16;

@@ -14,7 +14,8 @@ use mrol_service::{
 };
 
 impl Client {
-    /// Returns of each configuration whether a body meets a voxel, or what it meets first, or how much room it has, at the state that [`Answered::version`] names.
+    /// Returns of each configuration whether a body meets a voxel, or what it meets first, or how much room it has, at
+    /// the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -42,7 +43,8 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is, at the state that [`Answered::version`] names.
+    /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is,
+    /// at the state that [`Answered::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

@@ -36,7 +36,8 @@ pub(crate) struct WatchParams {
     map_uuid: Option<String>,
     /// The map's content hash at that revision, as the client was told: where the map had another, the whole state comes first.
     since_content_hash: Option<String>,
-    /// The state hash that was told with that revision, in sixteen hexadecimal digits: the same for keep-outs and viewpoints too.
+    /// The state hash that was told with that revision, in sixteen hexadecimal digits: the same for keep-outs and
+    /// viewpoints too.
     since_state_hash: Option<String>,
     /// Tell of the voxels of this level that came and went; without, of the finest as they were recorded.
     delta_level: Option<u32>,

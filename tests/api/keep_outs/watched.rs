@@ -99,8 +99,8 @@ async fn a_replica_follows_keep_outs_and_regards_them_as_the_server_does() {
     assert_eq!(replica.status().resets, 1);
 }
 
-/// An older data folder is put back, and the map goes on with the scans that were lost, but with other keep-outs: it has the
-/// uuid, the revision and the voxels that copies know.
+/// An older data folder is put back, and the map goes on with the scans that were lost, but with other keep-outs: it
+/// has the uuid, the revision and the voxels that copies know.
 #[tokio::test]
 async fn a_copy_has_the_maps_keep_outs_after_an_older_data_folder_was_put_back() {
     let daemon = started().await;

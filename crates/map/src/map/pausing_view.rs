@@ -6,8 +6,8 @@ use super::view::{LongRead, MapView};
 use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
-/// A view of a whole map that is let go of where others are to go first, and taken again after them, of the revision that the map
-/// has then.
+/// A view of a whole map that is let go of where others are to go first, and taken again after them, of the revision
+/// that the map has then.
 ///
 /// So what is read through it may be of several revisions: of the one that it names, or of later ones.
 #[derive(Debug)]
@@ -46,7 +46,8 @@ impl<'a> PausingView<'a> {
         self.first
     }
 
-    /// Lets others go first, where some wait and this work has had its part: to be called between the parts of long work.
+    /// Lets others go first, where some wait and this work has had its part: to be called between the parts of long
+    /// work.
     pub fn give_way(&mut self, stop: StopSignal<'_>) {
         if !stop.is_way_due() {
             return;

@@ -6,10 +6,11 @@ use super::content_hash::ContentHash;
 use super::multi_resolution_map::MultiResolutionMap;
 use crate::util::Digest;
 
-/// Hash of all that a copy of a map may hold: finest voxels, keep-outs and viewpoints. Equal where all of these are equal.
+/// Hash of all that a copy of a map may hold: finest voxels, keep-outs and viewpoints. Equal where all of these are
+/// equal.
 ///
-/// It tells whether a copy of a revision is of the history that a server has, or of one that was lost when an older data
-/// folder was put back. A copy does not compute it: it keeps what it was told.
+/// It tells whether a copy of a revision is of the history that a server has, or of one that was lost when an older
+/// data folder was put back. A copy does not compute it: it keeps what it was told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct StateHash(u64);
 
@@ -38,8 +39,8 @@ impl fmt::Display for StateHash {
 }
 
 impl MultiResolutionMap {
-    /// The hash of all that a copy of the map may hold now. To be called by who makes its changes: what it reads is of one
-    /// revision only while nobody makes another.
+    /// The hash of all that a copy of the map may hold now. To be called by who makes its changes: what it reads is of
+    /// one revision only while nobody makes another.
     pub fn state_hash(&self) -> StateHash {
         StateHash::of(self.content_version().hash, self.keep_outs().hash(), self.viewpoints().hash())
     }

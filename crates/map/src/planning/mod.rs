@@ -1,5 +1,5 @@
-//! What planners ask of a map, each question at one revision unless others go first meanwhile: does a body fit, at poses and along motions; where rays
-//! end; what is nearest; what the map is seen from above.
+//! What planners ask of a map, each question at one revision unless others go first meanwhile: does a body fit, at
+//! poses and along motions; where rays end; what is nearest; what the map is seen from above.
 //!
 //! Of bodies, [`Body`] is what is asked about, [`Planner`] who is asked, and [`PlanningView`] has the questions.
 //! `clearance` defines when a ball meets a voxel, and is what makes the answers fast; `check` asks it about bodies.

@@ -1,7 +1,7 @@
 //! Words that are mixed into a hash.
 
-/// A word mixed by the output function of SplitMix64 (Steele, Lea, Flood, *Fast splittable pseudorandom number generators*,
-/// OOPSLA 2014). Different words stay different.
+/// A word mixed by the output function of SplitMix64 (Steele, Lea, Flood, *Fast splittable pseudorandom number
+/// generators*, OOPSLA 2014). Different words stay different.
 pub fn mixed(word: u64) -> u64 {
     let z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -9,8 +9,8 @@ pub fn mixed(word: u64) -> u64 {
     z ^ z >> 31
 }
 
-/// A hash of words in their order. It is the same on every machine, and no guard against somebody who looks for two lists of
-/// words with the same hash.
+/// A hash of words in their order. It is the same on every machine, and no guard against somebody who looks for two
+/// lists of words with the same hash.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Digest(u64);
 

@@ -7,8 +7,8 @@ use crate::sync::before_pause;
 
 /// Lets other work go first, where some waits.
 pub trait GiveWay {
-    /// True where other work waits, and the work that calls this has had its part: a call of [`GiveWay::give_way`] would
-    /// wait for the other.
+    /// True where other work waits, and the work that calls this has had its part: a call of [`GiveWay::give_way`]
+    /// would wait for the other.
     fn is_due(&self) -> bool;
 
     /// Returns when the work that calls this is to go on: at once, or after other work.
@@ -43,7 +43,8 @@ impl<'a> StopSignal<'a> {
         Self { turns: Some(turns), ..self }
     }
 
-    /// True where [`StopSignal::give_way`] would let other work go first: who holds a lock asks before it gives it back for that.
+    /// True where [`StopSignal::give_way`] would let other work go first: who holds a lock asks before it gives it back
+    /// for that.
     pub fn is_way_due(self) -> bool {
         self.turns.is_some_and(GiveWay::is_due)
     }

@@ -60,8 +60,8 @@ impl RecentChanges {
         (0..LEVELS_MAX).filter(is_watched).collect()
     }
 
-    /// Adds the change that made the next revision, after which all that a copy may hold has the hash `state`. The oldest go where there is no room; one that is too large for all
-    /// of it leaves nothing.
+    /// Adds the change that made the next revision, after which all that a copy may hold has the hash `state`. The
+    /// oldest go where there is no room; one that is too large for all of it leaves nothing.
     pub(super) fn push(&self, change: WatchedChange, state: StateHash) {
         let mut gone = Vec::new();
         let mut ring = self.ring.lock();

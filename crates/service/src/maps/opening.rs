@@ -1,5 +1,5 @@
-//! The maps of a data folder at a start: those that can be opened, and why the others cannot; how many are opened at once, and how
-//! many requests may wait for that.
+//! The maps of a data folder at a start: those that can be opened, and why the others cannot; how many are opened at
+//! once, and how many requests may wait for that.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,8 +12,8 @@ use crate::work::Shares;
 use mrol_map::map::MapName;
 use mrol_store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError};
 
-/// Of `requests_max`, the share that may wait for maps that are opened: the rest is left for other maps. One caller may have half of
-/// that wait, which is as many as it may have in work by default.
+/// Of `requests_max`, the share that may wait for maps that are opened: the rest is left for other maps. One caller may
+/// have half of that wait, which is as many as it may have in work by default.
 const WAITING_SHARE: [usize; 2] = [3, 4];
 
 /// Finds the maps of a data folder; none of them is open yet.

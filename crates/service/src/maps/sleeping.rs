@@ -40,8 +40,8 @@ impl Catalog {
     /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one is given up.
     ///
     /// A disk that hangs under a map keeps nobody waiting for ever, and no other map from being opened: after
-    /// [`PLACE_MAX`] its place goes to another. Nor do those who wait for it keep requests for other maps out: they are a
-    /// share of all requests, of one asker as many as places are left.
+    /// [`PLACE_MAX`] its place goes to another. Nor do those who wait for it keep requests for other maps out: they are
+    /// a share of all requests, of one asker as many as places are left.
     pub(crate) async fn get(
         self: &Arc<Self>,
         name: &Reachable,
@@ -195,7 +195,7 @@ impl Catalog {
 /// A map that is opened, for which too many wait already.
 fn too_many_wait(name: &MapName) -> ServiceError {
     let message = format!(
-        "map {name} is being opened, and as many requests wait for maps that are opened as may: they keep none for other maps          out; try again"
+        "map {name} is being opened, and as many requests wait for that as may, so that other maps are served: try again"
     );
     ServiceError::new(Reason::CatalogBusy, message).retry_after(RETRY)
 }

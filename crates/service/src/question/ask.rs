@@ -31,7 +31,8 @@ const CHECKED_INLINE_BYTES: usize = 64 << 10;
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
-    /// Answers a question of a planner at the state that it names, see [`Answered`]: a small one where it arrives, others on a thread for planners.
+    /// Answers a question of a planner at the state that it names, see [`Answered`]: a small one where it arrives,
+    /// others on a thread for planners.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when

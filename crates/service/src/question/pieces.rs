@@ -8,8 +8,8 @@ use mrol_map::map::{ContentVersion, LongRead, MapView};
 use mrol_map::planning::{NearestVoxels, PlanningView, RayHits};
 use mrol_map::util::StopSignal;
 
-/// About how long a piece takes where it takes as long as most do, nanoseconds; ten or fifty times as long where elements
-/// take longer. So a view of the map is held for no longer than a part of a turn, and few pieces are needed.
+/// About how long a piece takes where its elements take as long as most do, nanoseconds; longer where they take longer.
+/// So a view of the map is held for not much longer than a part of a turn, and few pieces are needed.
 const PIECE_NS: usize = 1_000_000;
 /// Least elements of a piece, of which pieces have a multiple: the bits of a word.
 const WORD: usize = u64::BITS as usize;
@@ -54,9 +54,9 @@ impl Pieces {
         Self { elements, of_piece: (PIECE_NS / ns_each.max(1)).max(1) }
     }
 
-    /// The answers that `answer` has to each piece, put together, with the version of the first. All of them come from one
-    /// `view`, unless others were to go first between two of them: then from another one that was taken after that, so
-    /// that answers may be of later versions.
+    /// The answers that `answer` has to each piece, put together, with the version of the first. All of them come from
+    /// one `view`, unless others were to go first between two of them: then from another one that was taken after that,
+    /// so that answers may be of later versions.
     ///
     /// # Errors
     /// How the question was stopped; those of `view` and of `answer`.

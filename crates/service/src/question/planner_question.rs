@@ -46,8 +46,8 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// `InvalidArgument`, naming the field, the value and the limit.
     fn check(&self, limits: &Limits) -> Result<(), ServiceError>;
 
-    /// The answer from a view of `map`, with the version that it is of. Where others went first meanwhile, or it is found in
-    /// parts, the version is the first; the rest may be of later ones.
+    /// The answer from a view of `map`, with the version that it is of. Where others went first meanwhile, or it is
+    /// found in parts, the version is the first; the rest may be of later ones.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was;

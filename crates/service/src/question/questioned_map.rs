@@ -81,8 +81,8 @@ impl<'a> QuestionedMap<'a> {
         }
     }
 
-    /// A view of the whole map for a question of so many `elements`; where these are many, it keeps changes from beginning
-    /// meanwhile, so that no shorter question queues behind a change that waits for this one.
+    /// A view of the whole map for a question of so many `elements`; where these are many, it keeps changes from
+    /// beginning meanwhile, so that no shorter question queues behind a change that waits for this one.
     ///
     /// # Errors
     /// How the question was stopped: also where the view has to be waited for and must not be.

@@ -36,7 +36,8 @@ pub struct WatchedSince {
     /// is known, the whole state comes first: an older data folder was put back, and the caller has what was lost. Without
     /// it, the revision alone is believed.
     pub content_hash: Option<ContentHash>,
-    /// The state hash that the map had at that revision, as the caller was told: the same for keep-outs and viewpoints too.
+    /// The state hash that the map had at that revision, as the caller was told: the same for keep-outs and viewpoints
+    /// too.
     pub state_hash: Option<StateHash>,
 }
 
@@ -60,7 +61,8 @@ pub struct WatchMessage {
     pub map_uuid: Uuid,
     /// The newest revision that is durable: what a watch tells of reaches up to it.
     pub head_revision: u64,
-    /// Hash of all that a copy may hold at the revision that it tells of, of a heartbeat the head; none where it is not known.
+    /// Hash of all that a copy may hold at the revision that it tells of, of a heartbeat the head; none where it is not
+    /// known.
     pub state_hash: Option<StateHash>,
     /// What it tells.
     pub event: WatchEvent,

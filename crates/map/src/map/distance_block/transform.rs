@@ -69,8 +69,8 @@ impl<'a> Transform<'a> {
         (!self.stop.is_stopped()).then_some(())
     }
 
-    /// The rows, with a look at the signal before the first and before every so many more, where others go first; they end
-    /// once stopped. No lock is held meanwhile.
+    /// The rows, with a look at the signal before the first and before every so many more, where others go first; they
+    /// end once stopped. No lock is held meanwhile.
     fn in_parts<I: Iterator>(&self, rows: I) -> impl Iterator<Item = I::Item> {
         let per_look = (STEPS_PER_LOOK / (self.size[0] * (2 * self.margin + 1))).max(1);
         let stop = self.stop;

@@ -6,8 +6,8 @@ use crate::map::view::MapView;
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, Lattice, VoxelKey, VoxelSet};
 
-/// Voxels of a level as they were copied out of a map, with parts of one block apart: to be joined once the map is no longer
-/// locked.
+/// Voxels of a level as they were copied out of a map, with parts of one block apart: to be joined once the map is no
+/// longer locked.
 #[derive(Debug)]
 pub struct BlockParts(Vec<(VoxelKey, BlockMask)>);
 

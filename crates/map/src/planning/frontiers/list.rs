@@ -20,8 +20,8 @@ const CELLS_MAX: usize = u32::MAX as usize / 32;
 /// far away as is asked for, or else no nearer to what ends the line than to the frontier, and rather on the side where
 /// nothing is unknown.
 ///
-/// Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Others go first between its parts, so that parts of the box
-/// may be of later revisions than [`PausingView::version`]. Once stopped, some are missing.
+/// Takes half a byte a voxel of the box, and 4 a voxel of a frontier. Others go first between its parts, so that parts
+/// of the box may be of later revisions than [`PausingView::version`]. Once stopped, some are missing.
 ///
 /// # Errors
 /// For corners that make no box, a box of too many voxels, and a distance out of range.

@@ -25,8 +25,8 @@ use crate::util::StopSignal;
 /// neither are unknown.
 ///
 /// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a
-/// cell, and 4 more where cells are told apart. Others go first between its parts, so that parts of the grid may be of later
-/// revisions than [`PausingView::version`]. Once stopped, the grid lacks voxels.
+/// cell, and 4 more where cells are told apart. Others go first between its parts, so that parts of the grid may be of
+/// later revisions than [`PausingView::version`]. Once stopped, the grid lacks voxels.
 ///
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.

@@ -90,8 +90,8 @@ impl Projection {
         [first * self.voxel_m, (last + 1.0) * self.voxel_m]
     }
 
-    /// Calls `f` with the cell and the height's index of each voxel of the band in the blocks that meet `region`. Others go
-    /// first between the shards.
+    /// Calls `f` with the cell and the height's index of each voxel of the band in the blocks that meet `region`.
+    /// Others go first between the shards.
     fn for_each_voxel(
         &self,
         view: &mut PausingView<'_>,
