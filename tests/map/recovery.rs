@@ -149,7 +149,7 @@ fn a_robot_in_one_of_two_equal_rooms_is_found_in_neither_but_where_its_last_pose
     let viewpoints = [at(2.0, 2.5, 0.0), at(5.0, 2.5, 0.0)];
     let there = viewpoints.map(|pose| Pose::translation(apart_m, 0.0, 0.0) * pose);
     let mut rooms = World::mapped(Scene::equal_rooms(5, apart_m), &[viewpoints, there].concat());
-    for k in 0..3 {
+    for k in 0..2 {
         // It was never seen, and its guess is off by more than guesses are.
         let there = at(apart_m + 4.5, 2.6, 150.0 - 10.0 * f64::from(k));
         let refused = rooms.scan(&there, Guess::Pose(at(-20.0, 2.0, 0.0)));

@@ -66,7 +66,7 @@ impl ScanMapper<'_> {
     ) -> LocatedScan {
         let start = Instant::now();
         let points = scan.points_at(located.velocity.as_ref());
-        for _ in 0..KINDS_OF_SEARCH {
+        for _ in 0..self.kinds_of_search(scan) {
             let Some(task) = self.begin_search(scan.robot) else { break };
             let alone =
                 &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
@@ -78,6 +78,13 @@ impl ScanMapper<'_> {
             }
         }
         located
+    }
+
+    /// How many kinds of search differ for a scan: one where it tells which way is down, or its robot was never seen.
+    fn kinds_of_search(&self, scan: &Scan<'_>) -> u64 {
+        let keeps_tilt = self.recovery.is_some_and(|recovery| recovery.settings.keeps_tilt);
+        let differ = keeps_tilt && scan.gravity.is_none() && self.last_good(scan.robot).is_some();
+        if differ { KINDS_OF_SEARCH } else { 1 }
     }
 
     /// A refused scan with what the last search for its robot said.
