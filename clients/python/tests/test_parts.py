@@ -98,6 +98,19 @@ def test_five_million_points_are_asked_about(hall: mrol.Map) -> None:
     np.testing.assert_array_equal(nearest.distances_m, np.broadcast_to(nearest.distances_m[0], nearest.distances_m.shape))
 
 
+def test_no_groups_and_no_motions_have_empty_answers(hall: mrol.Map) -> None:
+    assert hall.check_spheres(np.zeros((0, 4)), sizes=[]).colliding.shape == (0,)
+    assert hall.check_motions(BALL, np.zeros((0, 3)), lengths=[]).free.shape == (0,)
+
+
+def test_a_refusal_says_from_where_its_elements_are_counted(hall: mrol.Map, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "ELEMENTS_MAX", 7)
+    points = POINTS.copy()
+    points[41] = np.nan
+    with pytest.raises(mrol.InvalidArgument, match=r"points\[6\].*; counted from element 35"):
+        hall.nearest(points, 1.0)
+
+
 def test_a_server_that_takes_fewer_gets_fewer(tmp_path: Path) -> None:
     config = tmp_path / "config.toml"
     config.write_text("[limits]\npoints_per_request_max = 3000\n")

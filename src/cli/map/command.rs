@@ -76,7 +76,7 @@ pub(crate) struct Map {
     #[arg(long, value_name = "SHARE")]
     min_overlap: Option<f64>,
     /// Leave a robot lost once its scans are refused. Otherwise each refused scan is aligned from other guesses, then
-    /// searched for in the whole map. Where scan and map show little of each other, the next scan has to confirm the place
+    /// searched for in the whole map, where the next scan has to confirm the place
     #[arg(long)]
     no_recovery: bool,
     /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one

@@ -92,7 +92,8 @@ def counts_of(value: ArrayLike, argument: str) -> U32:
     """Counts as little-endian unsigned numbers."""
     expected = "an array of counts, shape (n,)"
     array = as_numbers(value, argument, expected)
-    if array.ndim != 1 or array.dtype.kind not in "iu":
+    # What has nothing in it is of floats, where nobody says otherwise.
+    if array.ndim != 1 or (array.size > 0 and array.dtype.kind not in "iu"):
         raise ArgumentError(argument, f"an array of {array.dtype} of shape {array.shape}", expected)
     if array.size > 0 and not (int(array.min()) >= 0 and int(array.max()) < 1 << 32):
         raise ArgumentError(argument, excerpt(array), expected)

@@ -29,6 +29,10 @@ const AGREEMENT_MIN: f64 = 0.9;
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
+/// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the witnesses contradict
+/// each other.
+const CONTRADICTED_MIN: f64 = 0.005;
+const UNUSUAL: f64 = 2.0;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
 
@@ -218,12 +222,23 @@ impl<'a> Ends<'a> {
         let own = best.cost(preferred);
         let is_elsewhere = |pose: &Pose| !is_same_place(pose, &best.fit.map_from_sensor, self.resolution_m);
         let is_as_likely = |end: &&End| {
-            end.cost(preferred) - own <= RIVAL || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
+            end.cost(preferred) - own <= RIVAL
+                || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
+                || end.deviations < best.deviations && self.is_usual(end)
         };
         let ends = self.all.iter().filter(|end| has_evidence(&end.agreement));
         let ends = ends.filter(|end| is_elsewhere(&end.fit.map_from_sensor)).filter(is_as_likely);
         let of_end = |end: &End| Rival { map_from_sensor: end.fit.map_from_sensor, agreement: end.agreement };
         ends.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
+    }
+
+    /// True of an end that may be believed, and that rays contradict on one side hardly more than the witnesses contradict each other. Where
+    /// the scan comes to new ground, it is seen askew, and rays contradict the true pose a little more than one where all is known.
+    pub(super) fn is_usual(&self, end: &End) -> bool {
+        let RayAgreement { of_scan, of_map } = end.agreement;
+        let both = of_scan.contradicted_share().min(of_map.contradicted_share());
+        end.against.is_none()
+            && (both <= CONTRADICTED_MIN || both <= UNUSUAL * self.contradicted_among_witnesses())
     }
 
     /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard deviations
@@ -249,7 +264,7 @@ impl<'a> Ends<'a> {
     }
 
     /// The share of what each witness met that another one contradicts.
-    pub(super) fn contradicted_among_witnesses(&self) -> f64 {
+    fn contradicted_among_witnesses(&self) -> f64 {
         self.witnesses.contradicted_among_each_other(self.rays.tolerance_m)
     }
 }

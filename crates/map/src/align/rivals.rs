@@ -18,10 +18,6 @@ use super::verdict::{Alignment, Verdict};
 use crate::geometry::Pose;
 use crate::map::MultiResolutionMap;
 
-/// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the witnesses contradict
-/// each other.
-const CONTRADICTED_MIN: f64 = 0.005;
-const UNUSUAL: f64 = 2.0;
 /// How many times as much rays have to contradict a pose aside: so many r_0, or turned by so many degrees.
 const CONTRAST_MIN: f64 = 2.0;
 const ASIDE_VOXELS: f64 = 8.0;
@@ -115,13 +111,8 @@ impl Contest<'_> {
     /// True of an end that rays contradict both ways, by more than the witnesses contradict each other: people, and what was brought
     /// or taken away, contradict one side only.
     fn is_doubted(&self, end: &End, ends: &Ends<'_>) -> bool {
-        let RayAgreement { of_scan, of_map } = end.agreement;
-        let both = of_scan.contradicted_share().min(of_map.contradicted_share());
         let is_contradicted = matches!(end.against, Some((Verdict::Contradicted, _)));
-        is_contradicted
-            || end.against.is_none()
-                && both > CONTRADICTED_MIN
-                && both > UNUSUAL * ends.contradicted_among_witnesses()
+        is_contradicted || end.against.is_none() && !ends.is_usual(end)
     }
 
     /// The verdict on the best of the ends.

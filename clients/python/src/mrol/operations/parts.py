@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Shape
 from .._transport.deadline import Deadline
-from ..errors import DeadlineExceeded, InvalidArgument
+from ..errors import DeadlineExceeded, InvalidArgument, ServerError
 from ..version import InParts, Version
 
 ELEMENTS_MAX = 2_000_000
@@ -54,11 +54,17 @@ def ask_in_parts(deadline: Deadline, count: int, array_bytes: int, shape: Shape,
             answers.append(ask(Part(part, answers[0].map_uuid if answers else None, deadline)))
         except (InvalidArgument, DeadlineExceeded) as refused:
             if refused.reason not in TOO_MUCH or at_once <= CUT_MIN:
-                raise
+                raise _of_part(refused, begin) from None
             at_once = -(-at_once // 2)
         else:
             begin = part.stop
     return shaped(_joined(answers), shape)
+
+
+def _of_part(refused: ServerError, begin: int) -> ServerError:
+    """The refusal of a part, which says where the part begins: elements are counted from there in it."""
+    message = f"{refused.message}; counted from element {begin}, where a part of the question begins" if begin else refused.message
+    return type(refused)(refused.status, refused.code, refused.reason, message, refused.retry_after_s)
 
 
 def beginning_of(answer: Answer, count: int) -> Answer:

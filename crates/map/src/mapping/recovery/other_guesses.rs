@@ -108,21 +108,6 @@ impl<'a> ScanMapper<'a> {
         is_there.then_some((Recovered::Localization, alignment))
     }
 
-    /// Aligns the scan from where a search for it, the refused one, saw its robot: accepted where it is there beyond doubt, and its robot is
-    /// lost no longer. Where scan and map show little of each other, the next scan has to confirm it.
-    pub(super) fn try_place_found(
-        &self,
-        scan: &Scan<'_>,
-        points: &[Point],
-        stop: StopSignal<'_>,
-    ) -> Option<(Recovered, Alignment)> {
-        let lost = self.recovery?.lost;
-        let robot = lost.get(scan.robot, &self.lost_since(scan))?;
-        let found = self.try_place(scan, Some(&robot), Some(&Pose::identity()), points, stop);
-        let found = found.filter(|(_, there)| there.agreement.is_some_and(|agreement| agreement.is_ample()));
-        found.inspect(|_| lost.found(scan.robot))
-    }
-
     /// Since when the robot of a refused scan is lost.
     fn lost_since(&self, scan: &Scan<'_>) -> LostSince {
         LostSince {

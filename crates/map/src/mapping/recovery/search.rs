@@ -56,8 +56,8 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// Searches for the robot of a refused scan at once, and for as long as it takes. Returns the scan where it was found, if it fits
-    /// there, or as it was located; then the robot's next scan is looked for there first.
+    /// Searches for the robot of a refused scan at once, and for as long as it takes; returns the scan as it was located, with that time. The
+    /// next scan has to confirm what is found: in a mirror, along shelves and before a blank wall the same scan fits at a wrong place as well.
     pub(in crate::mapping) fn search_at_once(
         &self,
         scan: &Scan<'_>,
@@ -65,19 +65,14 @@ impl ScanMapper<'_> {
         stop: StopSignal<'_>,
     ) -> LocatedScan {
         let start = Instant::now();
-        let points = scan.points_at(located.velocity.as_ref());
         for _ in 0..self.kinds_of_search(scan) {
             let Some(task) = self.begin_search(scan.robot) else { break };
             let alone =
                 &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
             // An error is noted with the robot, and told with the scan.
             drop(self.search(&task, alone));
-            if let Some((recovered, alignment)) = self.try_place_found(scan, &points, stop) {
-                let align_time = located.align_time + start.elapsed();
-                return LocatedScan { alignment, align_time, recovered: Some(recovered), ..located };
-            }
         }
-        located
+        LocatedScan { align_time: located.align_time + start.elapsed(), ..located }
     }
 
     /// How many kinds of search differ for a scan: one where it tells which way is down, or its robot was never seen.

@@ -30,6 +30,9 @@ use crate::util::StopSignal;
 ///
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.
+///
+/// [`MapView::with_keep_outs`]: crate::map::MapView::with_keep_outs
+/// [`MapView::with_viewpoints`]: crate::map::MapView::with_viewpoints
 pub fn project_grid(
     view: &mut PausingView<'_>,
     request: &GridRequest,
