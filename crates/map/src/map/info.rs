@@ -61,7 +61,8 @@ pub struct MapDescription {
 }
 
 impl MultiResolutionMap {
-    /// Describes the map, at one revision.
+    /// Describes the map, at one revision but for the bytes of moments and of what lies beside the voxels. Waits for no
+    /// [long read](MultiResolutionMap::long_read), and for no change that waits for one: it takes some milliseconds.
     ///
     /// False positives are measured on `samples` absent neighbors of occupied voxels a level, drawn from `seed`.
     pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
@@ -76,8 +77,7 @@ impl MultiResolutionMap {
 
     /// The description, which is of no use once stopped.
     fn described_until(&self, samples: usize, seed: u64, stop: StopSignal<'_>) -> MapDescription {
-        let long = self.long_read();
-        let (moments, view) = (long.moments(), long.view());
+        let (moments, view) = (self.moments(), self.view());
         let describe_level = |level| self.describe_level(&view, level, samples, seed, stop);
         let levels = (0..self.settings.levels).map(describe_level);
         let viewpoints = self.viewpoints();
@@ -96,8 +96,7 @@ impl MultiResolutionMap {
     /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory, and of what is derived of
     /// the voxels beside the map.
     pub fn memory_bytes(&self) -> usize {
-        let long = self.long_read();
-        let (moments, view) = (long.moments(), long.view());
+        let (moments, view) = (self.moments(), self.view());
         view.shards().map(Shard::set_bytes).sum::<usize>()
             + moments.map_or(0, |moments| moments.bytes())
             + self.trajectory().memory_bytes()
@@ -196,4 +195,38 @@ fn random_neighbor(voxel: VoxelKey, random: &mut ChaCha8Rng) -> Option<VoxelKey>
     let step = if step < 13 { step } else { step + 1 };
     let [x, y, z] = voxel.index();
     VoxelKey::new([x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+    use std::time::Duration;
+
+    use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+    use crate::voxel::{VoxelKey, VoxelSet};
+
+    #[test]
+    fn a_description_waits_for_no_change_that_waits_for_a_long_read() {
+        let voxel = VoxelKey::new([1, 2, 3]).unwrap();
+        let contents = MapContents::at(7, [voxel].into_iter().collect());
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 2), contents).unwrap();
+        let (long_read, gone) = (map.long_read(), map.view().voxels());
+        std::thread::scope(|threads| {
+            threads.spawn(|| map.committer().exchange(&gone, &VoxelSet::default()));
+            // A change that waits lets no further long read begin.
+            while map.try_long_read().is_some() {
+                std::thread::yield_now();
+            }
+            let (told, described) = channel();
+            threads.spawn(|| {
+                let described = map.describe(16, 1);
+                told.send((described.version.revision, map.memory_bytes() > 0)).unwrap();
+                drop(told);
+            });
+            let described = described.recv_timeout(Duration::from_secs(20));
+            drop(long_read);
+            assert_eq!(described, Ok((7, true)));
+        });
+        assert_eq!(map.describe(16, 1).version.revision, 8);
+    }
 }

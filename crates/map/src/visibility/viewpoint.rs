@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
+use super::cube_map::TILE_SIDE;
 use super::range_image::{Met, RangeImage};
 use super::reach::Reach;
 use crate::geometry::{Pose, rotation_xyzw, translation_m};
@@ -99,6 +100,7 @@ impl Viewpoint {
 
     /// Bytes of memory, those of its places in an index and of what it met with them.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + self.image.memory_bytes() + self.reach.memory_bytes() + MET * size_of::<Met>()
+        let met = MET.min(self.image.tiles.len() * TILE_SIDE * TILE_SIDE) * size_of::<Met>();
+        size_of::<Self>() + self.image.memory_bytes() + self.reach.memory_bytes() + met
     }
 }

@@ -195,7 +195,8 @@ impl Catalog {
 /// A map that is opened, for which too many wait already.
 fn too_many_wait(name: &MapName) -> ServiceError {
     let message = format!(
-        "map {name} is being opened, and as many requests wait for that as may, so that other maps are served: try again"
+        "map {name} is not open yet, and as many requests of this caller wait for maps that are opened, this one or others, as may: \
+         try again"
     );
     ServiceError::new(Reason::CatalogBusy, message).retry_after(RETRY)
 }
