@@ -15,9 +15,6 @@ use crate::visibility::{ScanImage, Sight, Viewpoint, ViewpointSet};
 const POINTS: usize = 800;
 /// Depths that differ by so many r_0 are the same.
 const TOLERANCE: f64 = 2.0;
-/// Least share of points that agree, of the side that shows more of the other; of both sides where nothing else is known.
-pub(super) const EVIDENCE_MIN: f64 = 0.2;
-
 /// What rays of one side say of a pose: a number of points that were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {
@@ -100,11 +97,6 @@ impl RayAgreement {
     /// The smaller evidence of both sides.
     pub fn evidence(&self) -> f64 {
         self.of_scan.evidence().min(self.of_map.evidence())
-    }
-
-    /// True where each side shows a fifth of the other at least, so that a scan is believed where nothing but rays tells its place.
-    pub fn is_ample(&self) -> bool {
-        self.evidence() >= EVIDENCE_MIN
     }
 }
 

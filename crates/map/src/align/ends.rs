@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use nalgebra::Vector3;
 
-use super::agreement::{EVIDENCE_MIN, RayAgreement, Rays, Rival};
+use super::agreement::{RayAgreement, Rays, Rival};
 use super::fit::Fit;
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
@@ -18,7 +18,9 @@ use crate::util::StopSignal;
 /// Poses that differ by less than this many r_0 and less than [`SAME_DEG`] are the same place.
 const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
-/// Least share of points that agree, of the side that shows less of the other: two that see nothing of each other cannot be compared.
+/// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see nothing of each other
+/// cannot be compared.
+const EVIDENCE_MIN: f64 = 0.2;
 const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since people and what was
 /// moved contradict one side only; farther away, where some pose of many fits by chance, of both.

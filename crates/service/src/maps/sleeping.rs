@@ -31,7 +31,7 @@ use tokio::time::timeout;
 
 /// How long a request waits for a map that is opened.
 pub(super) const OPENING_MAX: Duration = Duration::from_secs(10);
-/// When who found no place among those who wait may try again.
+/// When a request that found no place among those that wait may be sent again.
 const RETRY: Duration = Duration::from_secs(1);
 /// How long a map that is opened keeps others from being opened, where all places are taken.
 const PLACE_MAX: Duration = Duration::from_secs(5);
@@ -195,8 +195,8 @@ impl Catalog {
 /// A map that is opened, for which too many wait already.
 fn too_many_wait(name: &MapName) -> ServiceError {
     let message = format!(
-        "map {name} is not open yet, and as many requests of this caller wait for maps that are opened, this one or others, as may: \
-         try again"
+        "map {name} is not open yet, and as many requests of this caller wait for maps that are opened, this one or \
+         others, as may: try again"
     );
     ServiceError::new(Reason::CatalogBusy, message).retry_after(RETRY)
 }

@@ -46,6 +46,9 @@ pub(super) struct Verdicts {
     seed: u64,
 }
 
+/// Least share of points that agree, of each side, for a pose whose rays tell anything.
+const EVIDENCE_MIN: f64 = 0.2;
+
 impl Verdicts {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
         let settings = AlignmentSettings::default();
@@ -212,7 +215,7 @@ impl Agreement {
     const HEAD: &str = "rays tell of  at true poses at least  at wrong ones at most  the others' least  true ones below  set";
 
     fn of_all(pairs: &[(String, Vec<[RayAgreement; 2]>)]) -> Vec<Self> {
-        let tells = |agreement: &&RayAgreement| agreement.is_ample();
+        let tells = |agreement: &&RayAgreement| agreement.evidence() >= EVIDENCE_MIN;
         let least = |of: &[[RayAgreement; 2]]| {
             of.iter().map(|[right, _]| right).filter(tells).map(RayAgreement::better).fold(1.0, f64::min)
         };
