@@ -726,7 +726,7 @@ typedef struct mrol_localization_answer {
     char reason[MROL_MESSAGE_BYTES];
 } mrol_localization_answer;
 
-/* Version of the library, "0.1.0", and of the interface that it has: MROL_ABI_VERSION of its own header. */
+/* Version of the library, "0.2.0", and of the interface that it has: MROL_ABI_VERSION of its own header. */
 const char *mrol_library_version(void);
 uint32_t mrol_abi_version(void);
 

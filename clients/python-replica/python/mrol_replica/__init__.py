@@ -15,6 +15,6 @@ from ._questions import PreparedBody
 from .local_map import LocalMap
 from .replica import Replica, ReplicaStatus
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = ["LocalMap", "PreparedBody", "Replica", "ReplicaStatus"]

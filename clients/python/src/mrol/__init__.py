@@ -71,7 +71,7 @@ from .pose import Pose
 from .shapes import Box, OrientedBox, Prism, Sphere
 from .version import Version, Versioned
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "ArgumentError",
