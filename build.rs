@@ -20,7 +20,8 @@ fn features() -> String {
 
 /// The commit that is built: what SOURCE_COMMIT says, and else git of a build for use.
 ///
-/// A developer's build names none. To be true it would be told anew after every commit, and the crate be built anew for it.
+/// A developer's build names none. To be true it would be told anew after every commit, and the crate be built anew for
+/// it.
 fn commit() -> Option<String> {
     println!("cargo::rerun-if-env-changed=SOURCE_COMMIT");
     if let Some(commit) = std::env::var("SOURCE_COMMIT").ok().filter(|commit| !commit.is_empty()) {
@@ -38,8 +39,8 @@ fn commit() -> Option<String> {
     if std::fs::canonicalize(top).ok()? != here.canonicalize().ok()? {
         return None;
     }
-    // The journal of HEAD grows with every commit and checkout; what else is named here makes a clean tree one with changes.
-    // Commands are not: the library would be built anew for a word of their help.
+    // The journal of HEAD grows with every commit and checkout; what else is named here makes a clean tree one with
+    // changes. Commands are not: the library would be built anew for a word of their help.
     let journal = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
     let modules = std::fs::read_dir("src").ok()?.flatten().map(|entry| entry.path());
     let library =

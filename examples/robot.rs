@@ -32,8 +32,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     let client = Client::connect_with(&url, &credentials()?).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
-    // Session and number make a retry safe: a scan that the map has already is answered again, and not added twice. A new
-    // session at each start lets the numbers begin again.
+    // Session and number make a retry safe: a scan that the map has already is answered again, and not added twice. A
+    // new session at each start lets the numbers begin again.
     let session = new_session();
     let requests = scans.into_iter().zip(0..).map(move |(points, scan_id)| ScanRequest {
         session: session.clone(),

@@ -1,5 +1,5 @@
-//! A map that is listed all the time, while parts of it are deleted and inserted again: queries are answered at once all
-//! the same. Then all of it is deleted at once.
+//! A map that is listed all the time, while parts of it are deleted and inserted again: queries are answered at once
+//! all the same. Then all of it is deleted at once.
 //!
 //! CI takes a million voxels for 5 s and asks that everything goes on. The long form takes 20 million for two minutes,
 //! and percentiles:

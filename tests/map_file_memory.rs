@@ -1,4 +1,5 @@
-//! Reading a map file, or a record of a journal for one voxel, takes no more memory than is asked for, whatever they hold.
+//! Reading a map file, or a record of a journal for one voxel, takes no more memory than is asked for, whatever they
+//! hold.
 
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]

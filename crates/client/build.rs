@@ -28,8 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The messages of the API in which elements are counted before they are decoded (`crates/client/src/wire/codec`), as source text: of
-/// each the fields that have such elements, or messages with some.
+/// The messages of the API in which elements are counted before they are decoded (`crates/client/src/wire/codec`), as
+/// source text: of each the fields that have such elements, or messages with some.
 fn table_of_elements(api: &FileDescriptorSet) -> Result<String, std::fmt::Error> {
     let messages = api.file.iter().flat_map(|file| &file.message_type);
     let messages: BTreeMap<String, &DescriptorProto> =

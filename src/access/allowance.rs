@@ -66,7 +66,8 @@ impl Allowance {
         }))
     }
 
-    /// Takes a place for a request in work, of as many as the key says, or else of `usual`; any number where that is none.
+    /// Takes a place for a request in work, of as many as the key says, or else of `usual`; any number where that is
+    /// none.
     ///
     /// # Errors
     /// When as many of `who` are in work as may be.

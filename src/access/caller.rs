@@ -1,4 +1,4 @@
-//! Who asks.
+//! The caller of a request.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::allowance::Allowance;
 use super::key::Key;
 use mrol_service::{AllowedMaps, AllowedScans, ServiceError};
 
-/// Who asks for something: the holder of a key, or anybody.
+/// The caller of a request: the holder of a key, or anybody.
 #[derive(Debug, Clone)]
 pub struct Caller {
     key: Option<Arc<Key>>,
@@ -14,7 +14,7 @@ pub struct Caller {
 }
 
 impl Caller {
-    /// Somebody without a key, who may name the allowed maps.
+    /// A caller without a key, that may name the allowed maps.
     pub(super) fn without_key(allowed_maps: AllowedMaps) -> Self {
         Self { key: None, allowed_maps }
     }

@@ -1,4 +1,4 @@
-//! A key: who holds it, and what it is for.
+//! A key: its holder, and what it is for.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -16,7 +16,7 @@ use mrol_service::{AllowedMaps, AllowedScans, Reason, ServiceError};
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;
 
-/// Who a key was made for: 1 to 64 of `[A-Za-z0-9_.-]`, fit for a log line and a metric's label.
+/// The holder of a key: 1 to 64 of `[A-Za-z0-9_.-]`, fit for a log line and a metric's label.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct KeyName(Arc<str>);
 

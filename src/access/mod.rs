@@ -1,8 +1,8 @@
-//! Who may do what: the operations, the scope that each takes, and the keys that callers show.
+//! Access: the operations, the scope that each takes, and the keys that callers show.
 //!
 //! A request passes two checks. [`Gate::authorize`] asks, before anything of its body is read, whether the caller's key
-//! is for the operation, and whether a page of another site may be behind it; the service that it hands out then refuses
-//! every map and every robot that the key is not for.
+//! is for the operation, and whether a page of another site may be behind it; the service that it hands out then
+//! refuses every map and every robot that the key is not for.
 
 mod allowance;
 mod caller;

@@ -53,7 +53,8 @@ macro_rules! operations {
     };
 }
 
-// A scope of `None` asks for no key. Of undo, `Insert` covers that of named robots' scans: the service asks for the rest.
+// A scope of `None` asks for no key. Of undo, `Insert` covers that of named robots' scans: the service asks for the
+// rest.
 operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";

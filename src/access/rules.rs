@@ -1,4 +1,4 @@
-//! Who may do what.
+//! The rules of access.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,8 +55,8 @@ impl Access {
         self.keys.as_deref()
     }
 
-    /// Asks whether a browser may have sent a request for `operation` without its user's knowledge. Where keys are asked
-    /// for, no other site can show one, so that names do not matter.
+    /// Asks whether a browser may have sent a request for `operation` without its user's knowledge. Where keys are
+    /// asked for, no other site can show one, so that names do not matter.
     ///
     /// # Errors
     /// `PermissionDenied` with `host_not_allowed` or `cross_site`.
@@ -87,7 +87,7 @@ impl Access {
         self.keys.as_ref().map(|keys| keys.current().expiring(now, warning)).unwrap_or_default()
     }
 
-    /// Says who the holder of `secret` is, if that is somebody who may ask for `operation`.
+    /// The holder of `secret`, if it may ask for `operation`.
     ///
     /// # Errors
     /// `Unauthenticated` where a key is needed and there is none that counts; `PermissionDenied` where it is for less.

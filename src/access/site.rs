@@ -1,9 +1,9 @@
 //! Requests that a browser sends on behalf of a page of somebody else.
 //!
-//! A page may send requests wherever its visitor's browser reaches, this machine's loopback among it. Two rules keep such
-//! requests out. A page whose own name was made to lead here (DNS rebinding) shows by `Host`, so a server that asks
-//! for no key answers to names that it knows alone. A page of another site shows by `Origin` and `Sec-Fetch-Site`, and
-//! changes nothing.
+//! A page may send requests wherever its visitor's browser reaches, this machine's loopback among it. Two rules keep
+//! such requests out. A page whose own name was made to lead here (DNS rebinding) shows by `Host`, so a server that
+//! asks for no key answers to names that it knows alone. A page of another site shows by `Origin` and `Sec-Fetch-Site`,
+//! and changes nothing.
 
 use std::collections::BTreeSet;
 use std::net::IpAddr;

@@ -46,16 +46,17 @@ struct Inner {
     probes: Probes,
 }
 
-/// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are, and `streams_max` with what
-/// a stream keeps ahead of its reader.
+/// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are, and `streams_max`
+/// with what a stream keeps ahead of its reader.
 const SMALL_ANSWER_BYTES: usize = 16 << 10;
 
-/// Bytes of memory that an answer takes besides those of its body that are there already: to be put among its extensions
-/// by a handler whose body is made later.
+/// Bytes of memory that an answer takes besides those of its body that are there already: to be put among its
+/// extensions by a handler whose body is made later.
 #[derive(Debug, Clone, Copy)]
 pub struct AnswerBytes(pub usize);
 
-/// Memory that an answer takes until it is sent: what its handler says, or the bytes of a body that is there as a whole.
+/// Memory that an answer takes until it is sent: what its handler says, or the bytes of a body that is there as a
+/// whole.
 fn answer_bytes(response: &mut Response) -> usize {
     let whole = HttpBody::size_hint(response.body()).exact().unwrap_or_default();
     let bytes = response.extensions_mut().remove().map_or(whole as usize, |AnswerBytes(bytes)| bytes);
@@ -166,8 +167,8 @@ impl Admission {
         self.0.bodies.charge(bytes)
     }
 
-    /// Memory that an answer of a stream takes until it is sent; none of a small one, of which `streams_max` bounds how many
-    /// there are.
+    /// Memory that an answer of a stream takes until it is sent; none of a small one, of which `streams_max` bounds how
+    /// many there are.
     ///
     /// # Errors
     /// `ResourceExhausted` when there is no room.

@@ -33,12 +33,12 @@ impl Endings {
 /// An answer goes to its connection in pieces of so many bytes. The connection asks for the next one when it has room,
 /// so that the most of an answer that nobody reads lies here, where it counts.
 const PIECE_BYTES: usize = 64 << 10;
-/// Pieces below this size do not count any more once the connection has them. They are copied, so that nothing larger is
-/// kept for them.
+/// Pieces below this size do not count any more once the connection has them. They are copied, so that nothing larger
+/// is kept for them.
 const COPIED_BYTES_MAX: usize = 16 << 10;
 
-/// A body that holds the request that it answers, and `H`, until it was sent, or nobody takes it any more. When one of its
-/// endings comes, nothing more of it goes out, and who makes it is dropped.
+/// A body that holds the request that it answers, and `H`, until it was sent, or nobody takes it any more. When one of
+/// its endings comes, nothing more of it goes out, and its maker is dropped.
 pub(super) struct AnswerBody<H> {
     /// None when it has ended.
     body: Option<Body>,

@@ -1,4 +1,4 @@
-//! The bodies of all requests, and who gives way where there is no room for more.
+//! The memory of all request bodies; the slowest upload is evicted when it is full.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -238,8 +238,8 @@ impl Bodies {
 }
 
 impl Known {
-    /// Ends the body that has been silent for longest and is not `own`; false where there is none. What it had in memory
-    /// is free.
+    /// Ends the body that has been silent for longest and is not `own`; false where there is none. What it had in
+    /// memory is free.
     fn end_most_silent(&mut self, own: Option<u64>, grace: Duration, refusal: &ServiceError) -> bool {
         let others = self.bodies.iter().filter(|(number, _)| Some(**number) != own);
         let silent = others.filter_map(|(&number, body)| {

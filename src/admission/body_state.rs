@@ -16,7 +16,7 @@ pub(super) struct Body {
     bytes: usize,
     /// Up to when they came in time: each accounts for a part of a second, and none for time to come.
     in_time: Instant,
-    /// Since when nobody waits for more: meanwhile it is not the client who is silent.
+    /// Since when nothing waits for more: meanwhile the client is not the silent side.
     left_alone: Option<Instant>,
     state: State,
     ended: CancellationToken,

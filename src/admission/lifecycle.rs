@@ -70,7 +70,7 @@ impl Lifecycle {
     /// # Errors
     /// `Unavailable` when the server is draining, or is done with waiting for the request.
     pub async fn admit<T>(&self, request: impl Future<Output = T>) -> Result<T, ServiceError> {
-        // Held before the question is asked: who waits for the server to be idle then sees either this request
+        // Held before the question is asked: a waiter for the server to be idle then sees either this request
         // or its refusal.
         let _held = self.hold();
         if self.is_draining() {

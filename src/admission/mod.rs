@@ -1,4 +1,4 @@
-//! Who gets in, and how much of the server's memory may lie in requests and answers at once.
+//! Admission: which requests get in, and how much of the server's memory may lie in requests and answers at once.
 //!
 //! ```text
 //! rate of the caller -> the body arrives -> requests_max -> work -> the answer is sent
@@ -9,8 +9,8 @@
 //! count by the bytes that have come, not by what was declared; where there is no room for more, the one that has been
 //! silent for longest gives way.
 //!
-//! Probes need no key and are answered whatever else is done, so they have limits of their own: small bodies that come at
-//! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max_s`), few scrapes (`scrapes_max`) and few watches
+//! Probes need no key and are answered whatever else is done, so they have limits of their own: small bodies that come
+//! at once (`probes_max`, `probe_body_bytes_max`, `probe_time_max_s`), few scrapes (`scrapes_max`) and few watches
 //! (`health_watches_max`).
 
 mod admit;

@@ -53,8 +53,8 @@ impl OfConnection {
     }
 
     /// Since when the connection has had no request that was let in; none while it has one. Requests that are refused,
-    /// whatever becomes of their answers, are no use of a connection: limits bound how many are let in, and nothing bounds
-    /// how many are refused.
+    /// whatever becomes of their answers, are no use of a connection: limits bound how many are let in, and nothing
+    /// bounds how many are refused.
     pub fn idle_since(&self) -> Option<Instant> {
         let admitted = self.0.admitted.lock();
         (admitted.requests == 0).then_some(admitted.last)

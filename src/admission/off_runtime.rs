@@ -5,8 +5,9 @@ use mrol_service::{MapService, Reason, ServiceError};
 /// Requests and answers of more bytes than this are read and written away from the threads that serve connections.
 const INLINE_BYTES_MAX: usize = 64 << 10;
 
-/// What `make` makes of a request, or an answer, of `bytes`: where these are many, in the turn of the caller of `service`. `held` is what counts the request's memory: it is kept to the end of the work,
-/// whether or not somebody waits for it still.
+/// What `make` makes of a request, or an answer, of `bytes`: where these are many, in the turn of the caller of
+/// `service`. `held` is what counts the request's memory: it is kept to the end of the work, whether or not somebody
+/// waits for it still.
 ///
 /// # Errors
 /// `Internal` when the work panicked.

@@ -41,8 +41,8 @@ impl Probes {
     /// Answers a probe by `handle`, once its body has come: that is small, and comes at once.
     ///
     /// # Errors
-    /// `InvalidArgument` for a larger body, `DeadlineExceeded` for one that does not come, `ResourceExhausted` with the name
-    /// of the limit where there is no place.
+    /// `InvalidArgument` for a larger body, `DeadlineExceeded` for one that does not come, `ResourceExhausted` with the
+    /// name of the limit where there is no place.
     pub(super) async fn answer<F>(
         &self,
         operation: Operation,

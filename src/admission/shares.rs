@@ -8,8 +8,8 @@ use parking_lot::Mutex;
 
 use mrol_service::{Asker, ServiceError};
 
-/// As many for each caller as a limit allows: for each key, and each address of callers without a key. A clone counts the
-/// same.
+/// As many for each caller as a limit allows: for each key, and each address of callers without a key. A clone counts
+/// the same.
 #[derive(Debug, Clone)]
 pub(super) struct Shares {
     limit: &'static str,

@@ -10,8 +10,8 @@ use mrol_map::scan::{PointFilter, PointFilterError};
 /// Options of the alignment.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct AlignmentOptions {
-    /// How to align: the ascent on overlap and a refinement on the points' Gaussians (refined), or the ascent alone as in
-    /// the paper (overlap) [default: refined]
+    /// How to align: the ascent on overlap and a refinement on the points' Gaussians (refined), or the ascent alone as
+    /// in the paper (overlap) [default: refined]
     #[arg(long, value_parser = parse::keyword::<Method>())]
     method: Option<Method>,
 }

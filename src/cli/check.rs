@@ -53,8 +53,8 @@ pub(super) struct Check {
     /// Tell how much room there is, up to so many meters (and to 64 voxels of the level)
     #[arg(long, value_name = "METERS")]
     clearance: Option<f32>,
-    /// What voxels count as that no scan saw through: free, or occupied, so that a body fits only where all of it was seen to
-    /// be free
+    /// What voxels count as that no scan saw through: free, or occupied, so that a body fits only where all of it was
+    /// seen to be free
     #[arg(long, value_parser = parse::keyword::<Unknown>(), default_value = "free")]
     unknown: Unknown,
     #[command(flatten)]

@@ -48,7 +48,7 @@ other scans are sent all the same, and the exit code is then 3. It is 1 where sc
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Insert {
-    /// Scan files, or folders of them: .ply .pcd .xyz .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .f32
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
@@ -88,8 +88,8 @@ pub(super) struct Insert {
     /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none
     #[arg(long, value_name = "NAME", requires = "first_scan_id", value_parser = parse::session_name)]
     session: Option<SessionName>,
-    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or, with
-    /// --create, the first point. It is subtracted from them in double precision
+    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or,
+    /// with --create, the first point. It is subtracted from them in double precision
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
     origin: Option<OriginChoice>,
     /// Make the map first

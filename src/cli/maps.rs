@@ -77,7 +77,8 @@ pub(super) struct NewMapOptions {
     /// Side of a finest voxel, meters
     #[arg(long, value_name = "METERS")]
     resolution: f64,
-    /// Where the map's origin lies in the coordinates of a survey: "x y z", meters. Kept with the map, for `--origin auto`
+    /// Where the map's origin lies in the coordinates of a survey: "x y z", meters. Kept with the map, for `--origin
+    /// auto`
     #[arg(long, value_name = "X Y Z", allow_hyphen_values = true, value_parser = parse::vector)]
     origin: Option<[f64; 3]>,
     #[command(flatten)]

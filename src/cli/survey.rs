@@ -1,4 +1,5 @@
-//! Points that commands ask a server about: of a file or of the command line, in the map's coordinates or in those of a survey.
+//! Points that commands ask a server about: of a file or of the command line, in the map's coordinates or in those of a
+//! survey.
 
 use std::path::Path;
 
@@ -12,8 +13,8 @@ use mrol_map::scan::read_exact_points;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct SurveyOptions {
-    /// Where the map's origin lies in the coordinates of the points: "x y z", or auto for that of the map. It is subtracted
-    /// from them, and answers are in the map's coordinates [default: they are the map's]
+    /// Where the map's origin lies in the coordinates of the points: "x y z", or auto for that of the map. It is
+    /// subtracted from them, and answers are in the map's coordinates [default: they are the map's]
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
     origin: Option<OriginChoice>,
 }

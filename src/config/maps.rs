@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapsConfig {
-    /// Seconds after which a map that nobody uses or watches is saved and leaves memory; the next request opens it. 0 means
-    /// never, and is the default.
+    /// Seconds after which a map that nobody uses or watches is saved and leaves memory; the next request opens it. 0
+    /// means never, and is the default.
     pub sleep_after_s: u64,
 }
 

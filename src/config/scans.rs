@@ -24,12 +24,14 @@ pub struct RobotConfig {
     pub range_min_m: Option<f64>,
     /// Largest range: points farther from the sensor than this are skipped, meters.
     pub range_max_m: Option<f64>,
-    /// How far "no return" reaches: points at this distance and farther say that nothing was met up to here, and are skipped, meters.
+    /// How far "no return" reaches: points at this distance and farther say that nothing was met up to here, and are
+    /// skipped, meters.
     pub no_return_m: Option<f64>,
     /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
     /// skipped.
     pub body_m: Option<[[f64; 3]; 2]>,
-    /// Points at exactly 0 0 0 count as any other. false: they are skipped, since most drivers write them where nothing returned.
+    /// Points at exactly 0 0 0 count as any other. false: they are skipped, since most drivers write them where nothing
+    /// returned.
     pub keep_zeros: bool,
     /// Points beyond `range_max_m` say nothing. false: they tell that nothing was met up to there.
     pub beyond_range_is_noise: bool,
@@ -39,8 +41,8 @@ pub struct RobotConfig {
     pub carve: bool,
     /// Voxels around the surface that a scan shows that it never takes out. 1.
     pub carve_margin_voxels: u32,
-    /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken out,
-    /// degrees. 8.
+    /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken
+    /// out, degrees. 8.
     pub carve_grazing_deg: f64,
     /// Voxels farther from the sensor than this are not taken out, meters. 20.
     pub carve_range_max_m: f64,

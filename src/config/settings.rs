@@ -39,8 +39,8 @@ pub struct Config {
     pub maps: MapsConfig,
     /// Seconds that requests in flight may take when the server goes down, and saving the maps after them. 10.
     pub drain_seconds: u64,
-    /// Seconds that the server goes on to serve after it was told to end, while `/readyz` says that it is not ready: for
-    /// balancers that look at it now and then. 0; 5 in the container image.
+    /// Seconds that the server goes on to serve after it was told to end, while `/readyz` says that it is not ready:
+    /// for balancers that look at it now and then. 0; 5 in the container image.
     pub drain_delay_s: u64,
     /// The HTTP listener; 127.0.0.1:7333.
     pub http: ListenerConfig,

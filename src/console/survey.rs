@@ -44,11 +44,11 @@ fn first_place(points: &[Point3<f64>]) -> Option<[f64; 3]> {
     points.iter().find(is_place).map(|point| point.coords.map(f64::round).into())
 }
 
-/// How scans in the coordinates of a survey become scans of points near 0 and poses in the map, exactly: points are shifted, and
-/// poses composed, in f64.
+/// How scans in the coordinates of a survey become scans of points near 0 and poses in the map, exactly: points are
+/// shifted, and poses composed, in f64.
 ///
-/// With an origin O the map has the place `P p - O` for a point `p` of a file and its pose `P`, which is the identity where nobody
-/// knows it.
+/// With an origin O the map has the place `P p - O` for a point `p` of a file and its pose `P`, which is the identity
+/// where nobody knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Survey {
     /// The map's origin in the frame of the poses.
@@ -116,7 +116,8 @@ impl Survey {
     }
 }
 
-/// True where f32 rounds half of the finite points or more too much: a few huge ones are those of drivers, for "nothing returned".
+/// True where f32 rounds half of the finite points or more too much: a few huge ones are those of drivers, for "nothing
+/// returned".
 fn is_coarse(points: &[Point3<f64>], shift: &Vector3<f64>, resolution_m: f64) -> bool {
     let filter = PointFilter::default();
     let is_point = |point: &&Point3<f64>| filter.is_return(Point::from(**point));

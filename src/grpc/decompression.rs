@@ -1,8 +1,8 @@
 //! Compressed messages, and where they are inflated.
 //!
 //! A kilobyte may become tens of megabytes, in one go while a call's future is polled. On the threads that serve
-//! connections that would keep everybody else waiting, so such calls are polled a few at a time, each on a thread that is
-//! given up to it.
+//! connections that would keep everybody else waiting, so such calls are polled a few at a time, each on a thread that
+//! is given up to it.
 
 use std::pin::{Pin, pin};
 use std::sync::Arc;
@@ -67,7 +67,8 @@ impl<F: Future> Future for InTurn<'_, F> {
     }
 }
 
-/// Runs what takes long on this thread, while another one takes over what else this one would serve, if there can be one.
+/// Runs what takes long on this thread, while another one takes over what else this one would serve, if there can be
+/// one.
 fn in_place<T>(long: impl FnOnce() -> T) -> T {
     match Handle::current().runtime_flavor() {
         RuntimeFlavor::MultiThread => block_in_place(long),

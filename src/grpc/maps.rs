@@ -86,8 +86,8 @@ impl Maps for Adapter {
     }
 }
 
-/// The name, whether it is to be replaced, and the bytes of a file that comes in pieces. One of more than `most` bytes is refused, and one for a map
-/// that the caller may not name, before the second piece.
+/// The name, whether it is to be replaced, and the bytes of a file that comes in pieces. One of more than `most` bytes
+/// is refused, and one for a map that the caller may not name, before the second piece.
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
     arrival: &InboundBody,

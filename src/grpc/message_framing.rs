@@ -1,7 +1,7 @@
 //! Messages that are handed on when they are there.
 //!
-//! tonic makes room for a message as soon as its length is declared. A client that declares and does not send would have
-//! that memory for nothing, so the length is kept back until what it speaks of has come.
+//! tonic makes room for a message as soon as its length is declared. A client that declares and does not send would
+//! have that memory for nothing, so the length is kept back until what it speaks of has come.
 
 use std::collections::VecDeque;
 use std::pin::Pin;

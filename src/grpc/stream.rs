@@ -27,8 +27,8 @@ use mrol_service::{MapService, ServiceError};
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
 
-/// The answers to a stream of requests. Each counts by its size from when it is made until it is sent: the next one is asked
-/// for when there is room for it on the way to the client.
+/// The answers to a stream of requests. Each counts by its size from when it is made until it is sent: the next one is
+/// asked for when there is room for it on the way to the client.
 #[derive(Debug)]
 pub(super) struct Answers<T> {
     made: Receiver<Made<T>>,
@@ -78,9 +78,9 @@ pub(super) trait Message: prost::Message + 'static {
 
 impl Adapter {
     /// Answers each request by `handle`, in order, while the next ones are read. A request that fails is told by
-    /// `failed`, and the stream goes on; without, it ends with the first failure's status. It ends with `Unavailable` once
-    /// the server is going down and the request in hand is answered, and with `Unauthenticated` once the caller's key
-    /// counts no longer.
+    /// `failed`, and the stream goes on; without, it ends with the first failure's status. It ends with `Unavailable`
+    /// once the server is going down and the request in hand is answered, and with `Unauthenticated` once the caller's
+    /// key counts no longer.
     pub(super) fn answer_in_order<M, A, H, F>(
         &self,
         operation: Operation,

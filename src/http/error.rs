@@ -1,7 +1,8 @@
 //! Failures as HTTP answers: a status, and a problem document (`application/problem+json`, RFC 9457).
 //!
 //! `{"title":"Bad Request","status":400,"detail":"...","code":"invalid_argument","reason":"bad_pose"}`. `type` is left
-//! out, which by the RFC means that the status says what kind of problem it is; `reason` is the stable word for programs.
+//! out, which by the RFC means that the status says what kind of problem it is; `reason` is the stable word for
+//! programs.
 
 use axum::Json;
 use axum::extract::Request;

@@ -24,8 +24,8 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    /// `{<head>,"<field>":[...]}` with an array of `count` items, each of which `write` appends to the text: in pieces, each made
-    /// when it is asked for.
+    /// `{<head>,"<field>":[...]}` with an array of `count` items, each of which `write` appends to the text: in pieces,
+    /// each made when it is asked for.
     ///
     /// # Errors
     /// `Internal` where the head cannot be written.
@@ -52,8 +52,8 @@ impl Pieces {
         Ok(std::iter::once(first).chain(pieces).chain(std::iter::once("]}".to_owned())))
     }
 
-    /// Bytes of memory that the text of `count` items takes until it is sent: three pieces, one that is made, one that waits
-    /// and one that is sent.
+    /// Bytes of memory that the text of `count` items takes until it is sent: three pieces, one that is made, one that
+    /// waits and one that is sent.
     pub(super) fn bytes(&self, count: usize) -> usize {
         3 * count.min(self.items) * self.item_bytes
     }

@@ -1,5 +1,5 @@
-//! What is answered while the maps are being found: that the process lives, and how far that has come. The viewer's page is
-//! there too, and says the same.
+//! What is answered while the maps are being found: that the process lives, and how far that has come. The viewer's
+//! page is there too, and says the same.
 
 use axum::Router;
 use axum::extract::{Request, State};

@@ -38,7 +38,8 @@ pub struct JsonScan {
     pub information: Option<[[f64; 6]; 6]>,
     /// Directions of the pose that the map's surfaces leave open.
     pub undetermined: Vec<JsonDirection>,
-    /// How rays agree at the pose; null where the caller told it, of the first scan of a map, and of an answer that is given again.
+    /// How rays agree at the pose; null where the caller told it, of the first scan of a map, and of an answer that is
+    /// given again.
     pub rays: Option<JsonRayAgreement>,
     /// Poses that the scan may have been taken at as well: why it is ambiguous.
     pub rivals: Vec<JsonRival>,

@@ -4,7 +4,8 @@ use utoipa::openapi::schema::{ArrayBuilder, Object, ObjectBuilder, Type};
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
-/// Makes a type that stands for an array in a schema, from its name, its length, what it is an array of and its description.
+/// Makes a type that stands for an array in a schema, from its name, its length, what it is an array of and its
+/// description.
 macro_rules! vectors {
     ($($name:ident: $length:literal of $item:expr, $description:literal;)+) => {$(
         #[doc = concat!($description, ".")]

@@ -18,8 +18,9 @@ const SLEEP_DUE_INTERVAL: Duration = Duration::from_millis(500);
 /// How often histograms are folded between scrapes.
 const METRICS_UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Writes snapshots of the maps whose turn it is, ends the keep-outs whose time is up, puts maps to sleep that nobody uses,
-/// and keeps the metrics small, until the server is draining. None of these waits for another: a disk that hangs keeps the snapshots from their end alone.
+/// Writes snapshots of the maps whose turn it is, ends the keep-outs whose time is up, puts maps to sleep that nobody
+/// uses, and keeps the metrics small, until the server is draining. None of these waits for another: a disk that hangs
+/// keeps the snapshots from their end alone.
 pub(super) async fn keep_house(service: MapService, metrics: Metrics, lifecycle: Lifecycle) {
     let saving = save_snapshots(service.clone(), Times::every(SNAPSHOTS_DUE_INTERVAL, &lifecycle));
     let expiring = end_keep_outs(service.clone(), Times::every(KEEP_OUTS_DUE_INTERVAL, &lifecycle));

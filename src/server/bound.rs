@@ -54,12 +54,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// Binds both addresses and finds the maps, which [`Server::run`] opens. Maps in files of old are taken in first: meanwhile
-    /// HTTP says at `/readyz` how far that has come. Unix sockets are made when that is done. Dropped before, it stops.
+    /// Binds both addresses and finds the maps, which [`Server::run`] opens. Maps in files of old are taken in first:
+    /// meanwhile HTTP says at `/readyz` how far that has come. Unix sockets are made when that is done. Dropped before,
+    /// it stops.
     ///
     /// # Errors
-    /// When the data folder, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
-    /// and an address can be reached from elsewhere, unless the settings allow that.
+    /// When the data folder, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made;
+    /// where there are no keys and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
         let gauges = SystemGauges { data_dir: config.service_settings().data_dir };
         Self::bind_with(config, Arc::new(gauges)).await
@@ -147,8 +148,8 @@ impl Server {
     }
 
     /// Opens the maps, and serves each as soon as it is open, until `shutdown`. Then it goes down: says for
-    /// `drain_delay_s` that it is not ready, refuses what is new, waits `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
-    /// saved.
+    /// `drain_delay_s` that it is not ready, refuses what is new, waits `drain_seconds` at most for what is in flight,
+    /// and as long at most, or five seconds, for the maps to be saved.
     ///
     /// Idle and half-open connections do not keep it from going down: after their requests connections have
     /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.

@@ -9,8 +9,8 @@ const BESIDES_CONNECTIONS: usize = 512;
 
 /// The limits, with no more connections than the process may have files for.
 ///
-/// Asks the system for as many as `connections_max` takes, which is more than most give a process by themselves. Without
-/// a file nobody could connect, while idle connections do not give way before all their places are taken.
+/// Asks the system for as many as `connections_max` takes, which is more than most give a process by themselves.
+/// Without a file nobody could connect, while idle connections do not give way before all their places are taken.
 pub(super) fn within_allowed(limits: Limits) -> Limits {
     let besides = BESIDES_CONNECTIONS + 2 * limits.connections_reserved;
     let needed = 2 * limits.connections_max + besides;

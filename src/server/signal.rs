@@ -46,9 +46,9 @@ pub async fn exit_when_told() {
     std::process::exit(INTERRUPTED);
 }
 
-/// Ends the process after `bound`, should it still be there: a thread that hangs in a read or a write of a disk cannot be
-/// ended, and would keep the process for as long as the disk hangs. It needs nothing of the runtime, whose threads may
-/// hang as well.
+/// Ends the process after `bound`, should it still be there: a thread that hangs in a read or a write of a disk cannot
+/// be ended, and would keep the process for as long as the disk hangs. It needs nothing of the runtime, whose threads
+/// may hang as well.
 pub fn exit_after(bound: Duration) {
     let watch = move || {
         std::thread::sleep(bound);

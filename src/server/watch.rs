@@ -13,8 +13,8 @@ const INTERVAL: Duration = Duration::from_secs(1);
 /// The size of a block so large that the allocator has it from the system, and not from what it keeps for small ones.
 const LARGE_BLOCK: usize = 4 << 20;
 
-/// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of its
-/// own: a snapshot that takes long does not keep it from looking.
+/// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of
+/// its own: a snapshot that takes long does not keep it from looking.
 pub(super) async fn watch(service: MapService, metrics: Metrics, admission: Admission) {
     let mut looking = interval(INTERVAL);
     looking.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -42,9 +42,9 @@ pub(super) async fn measure(service: &MapService, metrics: &Metrics) {
     }
 }
 
-/// The program's allocator keeps what was freed for a second, and then gives it back when the next large block is freed.
-/// With the last map gone nobody else may free one, and a shortage of memory would last. The block is never written, so
-/// that it costs nothing.
+/// The program's allocator keeps what was freed for a second, and then gives it back when the next large block is
+/// freed. With the last map gone nobody else may free one, and a shortage of memory would last. The block is never
+/// written, so that it costs nothing.
 fn free_a_large_block() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGE_BLOCK)));
 }

@@ -45,8 +45,8 @@ const LINES_WAITING_MAX: usize = 16_384;
 pub struct Logging(#[expect(dead_code, reason = "it works when it is dropped")] WorkerGuard);
 
 /// Starts the process's log at `level`: a level or a list of `target=level`. With `audit` the lines of the
-/// [audit](super::audit::AUDIT) are written whatever the level, and without not at all. Lines are written until the result is
-/// dropped.
+/// [audit](super::audit::AUDIT) are written whatever the level, and without not at all. Lines are written until the
+/// result is dropped.
 ///
 /// # Errors
 /// When `level` is no filter, or the log was started before.

@@ -1,4 +1,5 @@
-//! Work whose caller is gone stops: while it waits, while it is in hand, and in streams; a deadline is a caller that goes.
+//! Work whose caller is gone stops: while it waits, while it is in hand, and in streams; a deadline is a caller that
+//! goes.
 
 use std::time::{Duration, Instant};
 

@@ -12,7 +12,8 @@ use crate::support::hall::{hall, seen_from};
 const STEP_NS: i64 = 100_000_000;
 const STEP_S: f64 = 0.1;
 
-/// The hall as a sensor at `map_from_sensor` (at time 0) sees it that moves with `velocity`: points at times from -0.1 s to 0.
+/// The hall as a sensor at `map_from_sensor` (at time 0) sees it that moves with `velocity`: points at times from -0.1
+/// s to 0.
 fn swept(map_from_sensor: &Pose, velocity: &Twist) -> (Vec<[f32; 3]>, Vec<f32>) {
     let still = seen_from(&hall(), map_from_sensor);
     let count = still.len() as f32;

@@ -134,7 +134,7 @@ async fn requests_for_a_map_whose_disk_hangs_keep_none_for_other_maps_out() {
     const REQUESTS_MAX: usize = 16;
     let data = tempfile::tempdir().unwrap();
     let server = Process::start(data.path().to_str().unwrap(), &[]);
-    for name in ["well", "hangs"] {
+    for name in ["well", "sleeps", "hangs"] {
         let map = format!("{}/v1/maps/{name}", server.http);
         client().put(&map).json(&json!({"resolution_m": 0.1})).send().await.unwrap();
     }
@@ -148,11 +148,14 @@ async fn requests_for_a_map_whose_disk_hangs_keep_none_for_other_maps_out() {
     serve.args(["serve", "--json", "--data-dir", data.path().to_str().unwrap(), "--drain-seconds", "1"]);
     serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0", "--log-level", "error"]);
     serve.env("MROL_LIMITS__REQUESTS_MAX", REQUESTS_MAX.to_string());
+    serve.env("MROL_MAPS__SLEEP_AFTER_S", "600");
     let server = Process::of(serve);
-    let map = |name: &str| client().get(format!("{}/v1/maps/{name}", server.http)).send();
+    let request = |name: &str| client().get(format!("{}/v1/maps/{name}", server.http));
+    let map = |name: &str| request(name).send();
     assert_eq!(map("well").await.unwrap().status(), StatusCode::OK);
-    // Of three quarters of all requests one caller has half; who is refused hears it while the others wait.
-    let waiting = REQUESTS_MAX * 3 / 4 / 2;
+    // Three quarters of all requests may wait, half of these for one map, and half of those by one caller; who is
+    // refused hears it while the others wait.
+    let waiting = REQUESTS_MAX * 3 / 4 / 2 / 2;
     let mut asked = JoinSet::new();
     // So many at a time that those who are refused find a place in work.
     for more in [2 * waiting, REQUESTS_MAX - waiting] {
@@ -160,12 +163,19 @@ async fn requests_for_a_map_whose_disk_hangs_keep_none_for_other_maps_out() {
         while asked.len() > waiting {
             let refused = asked.join_next().await.unwrap().unwrap().unwrap();
             assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
-            assert_eq!(refused.headers()["retry-after"], "1");
             assert_eq!(json_of(refused).await["reason"], "catalog_busy");
         }
     }
     assert_eq!(map("well").await.unwrap().status(), StatusCode::OK);
-    assert!(asked.try_join_next().is_none(), "they wait still");
+    // It sleeps, and is opened for the same caller.
+    assert_eq!(map("sleeps").await.unwrap().status(), StatusCode::OK);
+    // Once its opening takes too long, nobody waits for it any more.
+    let soon = async || request("hangs").timeout(Duration::from_secs(2)).send().await;
+    wait_until(async || {
+        matches!(soon().await, Ok(refused) if refused.status() == StatusCode::SERVICE_UNAVAILABLE
+            && refused.headers()["retry-after"] == "10")
+    })
+    .await;
     server.signal("TERM");
     code_at_end(server).await.expect("it ends by itself");
 }

@@ -213,7 +213,8 @@ async fn a_copy_of_what_was_lost_when_an_older_data_folder_was_put_back_gets_the
     let client = client_of(&daemon).await;
     for mut watcher in before {
         let region = watcher.is_part.then_some(region);
-        // Who sends no hash, as clients did before there was one, is believed its revision: what is lost stays in its copy.
+        // Who sends no hash, as clients did before there was one, is believed its revision: what is lost stays in its
+        // copy.
         let since =
             watcher.since().map(|since| WatchedSince { content_hash: None, state_hash: None, ..since });
         let request = WatchRequest { since, region, ..WatchRequest::default() };

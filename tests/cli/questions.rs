@@ -124,7 +124,8 @@ fn a_question_waits_for_a_revision_as_long_as_it_may() {
     assert!(told.contains("revision"), "{told}");
 }
 
-/// Points of a survey are the map's where its origin is subtracted, and refused where f32 would round them to other voxels.
+/// Points of a survey are the map's where its origin is subtracted, and refused where f32 would round them to other
+/// voxels.
 #[test]
 fn points_of_a_survey_are_asked_about_exactly() {
     let (daemon, folder) = (Process::start("", &[]), tempfile::tempdir().unwrap());

@@ -1,8 +1,8 @@
 //! Eight clients at once, over both protocols, on overlapping regions of one map: what they were told is what a
 //! serial replay gives.
 //!
-//! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60). With the feature `deadlock_detection` it fails as soon as
-//! threads wait for each other in a circle; without, once nothing has moved for a while.
+//! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60). With the feature `deadlock_detection` it fails as
+//! soon as threads wait for each other in a circle; without, once nothing has moved for a while.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 

@@ -1,4 +1,5 @@
-//! What is kept of a map: through `kill -9`, on disks that fail, across restarts, from former releases, and through undo.
+//! What is kept of a map: through `kill -9`, on disks that fail, across restarts, from former releases, and through
+//! undo.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 

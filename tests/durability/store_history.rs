@@ -1,5 +1,5 @@
-//! Long random histories of a map that is kept: scans, deletions, undo, keep-outs, snapshots and restarts, against a plain model
-//! that replays what was not undone.
+//! Long random histories of a map that is kept: scans, deletions, undo, keep-outs, snapshots and restarts, against a
+//! plain model that replays what was not undone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;

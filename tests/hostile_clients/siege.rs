@@ -131,9 +131,9 @@ fn settings() -> String {
     )
 }
 
-/// What clients may make the daemon hold, by its limits: bodies, connections of both protocols, streams, and a message in
-/// the hands of each thread of both pools and four of each that inflates one, whose room doubles and is given
-/// back after a moment.
+/// What clients may make the daemon hold, by its limits: bodies, connections of both protocols, streams, and a message
+/// in the hands of each thread of both pools and four of each that inflates one, whose room doubles and is given back
+/// after a moment.
 fn under_attack() -> usize {
     BODY_BYTES_MAX
         + 2 * CONNECTIONS_MAX * CONNECTION_BYTES_MAX

@@ -1,5 +1,5 @@
-//! Many maps in one server: what small ones take of memory and threads, how soon they are served after a restart, and maps
-//! that sleep while there is room for few.
+//! Many maps in one server: what small ones take of memory and threads, how soon they are served after a restart, and
+//! maps that sleep while there is room for few.
 //!
 //! The gate takes some hundred maps. The long form, of a release build:
 //!

@@ -31,8 +31,8 @@ fn column(index: i32, moved_m: f64) -> (f64, f64, f64) {
     (-moved_m * (1.0 - share), (share - 0.5) * AROUND_DEG.to_radians(), -SWEEP_S * (1.0 - share))
 }
 
-/// A wall at x = 8 m, and a plate before it at 3 m between two places on the y axis; seen by a sensor that comes along the y axis
-/// to the map's origin. Points in the sensor frame of their times, these times, and the points in the map.
+/// A wall at x = 8 m, and a plate before it at 3 m between two places on the y axis; seen by a sensor that comes along
+/// the y axis to the map's origin. Points in the sensor frame of their times, these times, and the points in the map.
 fn swept(moved_m: f64, plate_m: &Range<f64>) -> (Vec<Point>, Vec<f32>, Vec<Point>) {
     let ray = |(index, row): (i32, i32)| {
         let (y, azimuth, time_s) = column(index, moved_m);
@@ -62,7 +62,7 @@ fn behind_what_hid_it_from_a_moving_sensor_nothing_is_free() {
         assert_eq!(viewpoints.len(), 2);
         let places = (0..45)
             .flat_map(|i| (0..=120).map(move |j| (3.15 + f64::from(i) * 0.1, f64::from(j) * 0.05 - 3.0)));
-        let seen: Vec<(f64, f64)> = places.filter(|&(x, y)| viewpoints.sees_through([x, y, 0.0])).collect();
+        let seen: Vec<(f64, f64)> = places.filter(|&(x, y)| viewpoints.is_free([x, y, 0.0])).collect();
         // The ray that ran through a place ended at the plate.
         let is_hidden = |&&(x, y): &&(f64, f64)| {
             let off = |index: &i32| {
@@ -106,9 +106,9 @@ fn behind_the_robots_own_parts_nothing_is_free() {
         for i in 0..140 {
             let x = 0.7 + f64::from(i) * 0.05;
             for aside in [-0.03, 0.0, 0.03] {
-                assert!(!viewpoints.sees_through([x, aside * x, 0.0]), "{aside} at {x} m");
+                assert!(!viewpoints.is_free([x, aside * x, 0.0]), "{aside} at {x} m");
             }
         }
-        assert!(viewpoints.sees_through([0.4, 0.0, 0.0]) && viewpoints.sees_through([5.0, 1.0, 0.1]));
+        assert!(viewpoints.is_free([0.4, 0.0, 0.0]) && viewpoints.is_free([5.0, 1.0, 0.1]));
     }
 }

@@ -1,5 +1,5 @@
-//! Within a crate no two modules beside each other name each other, and code that may be unsafe stays in the kernels. What
-//! crates may name is in their manifests.
+//! Within a crate no two modules beside each other name each other, and code that may be unsafe stays in the kernels.
+//! What crates may name is in their manifests.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -181,8 +181,8 @@ fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Which modules beside each other name each other: by the module that they are in, from the one that names to the named,
-/// with a file in which it does.
+/// Which modules beside each other name each other: by the module that they are in, from the one that names to the
+/// named, with a file in which it does.
 fn edges(sources: &[Source]) -> BTreeMap<CratePath, BTreeMap<(String, String), PathBuf>> {
     let modules: BTreeSet<&[String]> = sources.iter().map(|source| source.module.as_slice()).collect();
     let handed_on: BTreeMap<&[String], &BTreeMap<String, String>> =

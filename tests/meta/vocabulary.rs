@@ -4,7 +4,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A word that is not used any more, as a whole word, and what is said instead.
-const REPLACED: [(&str, &str); 80] = [
+const REPLACED: [(&str, &str); 90] = [
+    ("ReachIndex", "CoverageIndex"),
+    ("Gaze", "ViewpointCache"),
+    ("gaze", "cache"),
+    ("WellBeyond", "AbsenceEvidence"),
+    ("sees_well_beyond", "proves_absent"),
+    ("others_see_through", "is_free_by_others"),
+    ("sees_beyond", "depth_exceeds"),
+    ("may_look_into", "may_cover"),
+    ("ToldBy", "ReportedBy"),
+    ("told_by", "reported_by"),
     ("ahead::fetch", "prefetch"),
     ("Interest", "StopSignal"),
     ("LASTING", "StopSignal::NEVER"),
@@ -87,8 +97,8 @@ const REPLACED: [(&str, &str); 80] = [
     ("optimise", "optimize"),
 ];
 
-/// Where an old word is the right one: an error names what a setting was called before, a workload is a room, and over the
-/// wire a pose of a trajectory is just that.
+/// Where an old word is the right one: an error names what a setting was called before, a workload is a room, and over
+/// the wire a pose of a trajectory is just that.
 const ALLOWED: [(&str, &str); 9] = [
     ("src/config/loading.rs", "disk_free_back_mib"),
     ("src/config/loading.rs", "memory_back_mib"),
@@ -123,6 +133,28 @@ fn no_old_word_is_left() {
         }
     }
     assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+/// Comments are read beside other code, in columns.
+const COLUMNS: usize = 120;
+
+#[test]
+fn comments_keep_to_their_columns() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = vec![root.join("build.rs")];
+    for folder in ["src", "crates", "clients/c", "clients/python-replica", "examples", "tests"] {
+        texts(&root.join(folder), &mut files);
+    }
+    let mut found = Vec::new();
+    for path in files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs")) {
+        let text = fs::read_to_string(path).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            if line.trim_start().starts_with("//") && line.chars().count() > COLUMNS {
+                found.push(format!("{}:{}", path.display(), number + 1));
+            }
+        }
+    }
+    assert!(found.is_empty(), "comments beyond {COLUMNS} columns:\n{}", found.join("\n"));
 }
 
 fn has_word(line: &str, word: &str) -> bool {

@@ -1,5 +1,5 @@
-//! A map that is deleted and made again while its snapshot is written, which takes long: nothing of the old one comes into
-//! the new one.
+//! A map that is deleted and made again while its snapshot is written, which takes long: nothing of the old one comes
+//! into the new one.
 
 use std::path::Path;
 use std::time::{Duration, Instant};

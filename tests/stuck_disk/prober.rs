@@ -80,8 +80,8 @@ fn asks_where_another_test_says() {
     let _ = std::io::stdin().read_to_end(&mut Vec::new());
 }
 
-/// Asks at fixed times, one question after the other. What would have been asked while an answer did not come would have
-/// waited for it, too: it counts as if it had been.
+/// Asks at fixed times, one question after the other. What would have been asked while an answer did not come would
+/// have waited for it, too: it counts as if it had been.
 fn ask_all_the_time(server: SocketAddr, kind: &str, request: &[u8], interval: Duration) {
     let mut due = Instant::now();
     loop {

@@ -2,8 +2,8 @@
 
 use mrol::geometry::{Point, Pose};
 
-/// A hall of 24 m by 10 m with shelves, no two alike, as points on its surfaces, meters, a hundred or so on a square meter.
-/// None lies on a border between voxels.
+/// A hall of 24 m by 10 m with shelves, no two alike, as points on its surfaces, meters, a hundred or so on a square
+/// meter. None lies on a border between voxels.
 pub fn hall() -> Vec<Point> {
     let mut points = Vec::new();
     let mut random = 1u32;

@@ -26,8 +26,8 @@ pub fn content_hash(set: &PlainSet) -> u64 {
     set.iter().map(mixed).fold(0, u64::wrapping_add)
 }
 
-/// The content hash, and at every level: the set, the filters where there are some (nothing denied, counters equal a recount),
-/// and single look-ups.
+/// The content hash, and at every level: the set, the filters where there are some (nothing denied, counters equal a
+/// recount), and single look-ups.
 pub fn assert_equal(map: &MultiResolutionMap, model: &PlainSet) {
     // Before the view, which holds the locks that these take.
     let counts: Vec<usize> = (0..map.settings().levels).map(|level| map.voxels(level)).collect();

@@ -1,4 +1,5 @@
-//! What the viewer takes, for docs/measurements.md: `cargo test --release --test viewer figures -- --ignored --nocapture`.
+//! What the viewer takes, for docs/measurements.md: `cargo test --release --test viewer figures -- --ignored
+//! --nocapture`.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! The viewer's page in a real browser: what it shows, does and refuses to do. Skipped, which is said, where there is no
-//! Chromium.
+//! The viewer's page in a real browser: what it shows, does and refuses to do. Skipped, which is said, where there is
+//! no Chromium.
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod browser;

@@ -1,4 +1,5 @@
-//! The pictures of the viewer in README and guides, made anew: `cargo test --release --test viewer pictures -- --ignored`.
+//! The pictures of the viewer in README and guides, made anew: `cargo test --release --test viewer pictures --
+//! --ignored`.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

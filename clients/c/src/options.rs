@@ -142,7 +142,7 @@ pub(crate) fn address_of(pointer: *const std::ffi::c_char) -> Result<String, Fai
 fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Failure> {
     let Some(path) = text(path, name)? else { return Ok(None) };
     let unreadable = |error| Failure::argument(format!("{name}: {path} cannot be read: {error}"));
-    // A pipe can keep who reads it waiting, and a device has no end.
+    // A pipe can keep its reader waiting, and a device has no end.
     if !std::fs::metadata(&path).map_err(unreadable)?.is_file() {
         return Err(Failure::argument(format!("{name}: {path} is no regular file")));
     }

@@ -27,8 +27,8 @@ pub(crate) static REPLICAS: Replicas = Replicas {
     runtime: Mutex::new(Weak::new()),
 };
 
-/// Open replicas by their numbers. A program that uses a number after its end finds nothing, where a pointer would be to
-/// memory that is somebody else's.
+/// Open replicas by their numbers. A program that uses a number after its end finds nothing, where a pointer would be
+/// to memory that is somebody else's.
 pub(crate) struct Replicas {
     last_number: AtomicU64,
     open: RwLock<BTreeMap<ReplicaHandle, Arc<OpenReplica>>>,
@@ -40,7 +40,7 @@ pub(crate) struct Replicas {
 pub(crate) struct OpenReplica {
     replica: Replica,
     is_whole: bool,
-    /// Tells who waits that the replica is closed.
+    /// Wakes all waiters: the replica is closed.
     closed: watch::Sender<bool>,
     /// The last field, so that its threads are there while the replica is dropped.
     runtime: Arc<Runtime>,

@@ -1,7 +1,8 @@
 //! Arrays of arguments, whose elements can be read where they lie.
 //!
-//! numpy's arrays begin at any byte and step by any number of bytes: a view into a message behind its header, a field of packed
-//! records. References of Rust cannot, and the crate `numpy` divides steps by the size of an element: it would read other bytes.
+//! numpy's arrays begin at any byte and step by any number of bytes: a view into a message behind its header, a field
+//! of packed records. References of Rust cannot, and the crate `numpy` divides steps by the size of an element: it
+//! would read other bytes.
 
 use std::ops::Deref;
 

@@ -36,7 +36,7 @@ pub(crate) struct Questions {
     pub(crate) source: OpenSource,
 }
 
-/// The points of an array of shape (n, 3), copied: who changes the array meanwhile changes nothing of the question.
+/// The points of an array of shape (n, 3), copied: changes of the array meanwhile do not change the question.
 pub(crate) fn points_of(rows: &Rows<'_>) -> PointCloud {
     // A slice there is of an array whose columns lie together, too.
     let points: Vec<Point> = match rows.as_slice().ok().filter(|_| rows.is_c_contiguous()) {
@@ -102,7 +102,8 @@ fn numbers_of(rows: &Floats<'_>) -> Vec<f32> {
     }
 }
 
-/// The array that an argument is which is not copied. One with masked values is none: what its masks hide are numbers here.
+/// The array that an argument is which is not copied. One with masked values is none: what its masks hide are numbers
+/// here.
 fn floats_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
     let expected = "an array of float32: numpy.asarray(..., numpy.float32) makes it so";
     let array = value.cast::<PyArrayDyn<f32>>().map_err(|_| argument(name, value, expected))?;
@@ -226,7 +227,8 @@ impl Questions {
         })
     }
 
-    /// Can a body move along configurations, so many of them a motion? The bits, the shares of first hits, and clearances.
+    /// Can a body move along configurations, so many of them a motion? The bits, the shares of first hits, and
+    /// clearances.
     #[expect(
         clippy::too_many_arguments,
         clippy::type_complexity,
@@ -278,8 +280,8 @@ impl Questions {
         })
     }
 
-    /// Is one motion free? For the innermost loop of a planner: no array is made, and nothing is checked that the question does
-    /// not check itself.
+    /// Is one motion free? For the innermost loop of a planner: no array is made, and nothing is checked that the
+    /// question does not check itself.
     #[pyo3(
         signature = (body, configurations, *, level = None, unknown_is_occupied = None, ignore_keep_outs = None),
         text_signature = "(body, configurations, *, level=0, unknown_is_occupied=False, ignore_keep_outs=False)"

@@ -14,8 +14,8 @@ use crate::questions::Questions;
 use crate::source::{OpenSource, Source};
 use crate::waiting::wait_for;
 
-/// How far a replica is: its version, the server's revision, whether it is connected, copies made, the last error, the seconds since
-/// the server was heard, whether it follows no longer.
+/// How far a replica is: its version, the server's revision, whether it is connected, copies made, the last error, the
+/// seconds since the server was heard, whether it follows no longer.
 type Status = (Version, u64, bool, u64, Option<String>, f64, bool);
 
 /// A copy of a server's map.

@@ -164,7 +164,8 @@ impl Client {
         Ok(listing)
     }
 
-    /// Returns a part of a level as it is stored, or the distance of each of its cells from what is occupied, at one revision.
+    /// Returns a part of a level as it is stored, or the distance of each of its cells from what is occupied, at one
+    /// revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

@@ -21,8 +21,8 @@ impl Client {
         self.domain(self.connection.mapping().list_events(request).await)
     }
 
-    /// Tells of the events that [`Client::list_events`] would return, then of each as it comes. It goes on until the answers
-    /// are dropped, the map is deleted or the connection is lost.
+    /// Tells of the events that [`Client::list_events`] would return, then of each as it comes. It goes on until the
+    /// answers are dropped, the map is deleted or the connection is lost.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

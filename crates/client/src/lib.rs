@@ -23,8 +23,8 @@
 //! # }
 //! ```
 //!
-//! A [`Client`] is a handle on one connection: clones share it, and calls on it run at the same time. The domain types that
-//! it takes are those of the map and of the service, whose modules are here too.
+//! A [`Client`] is a handle on one connection: clones share it, and calls on it run at the same time. The domain types
+//! that it takes are those of the map and of the service, whose modules are here too.
 
 mod answers;
 mod client;

@@ -210,8 +210,8 @@ impl Client {
         self.domain(self.connection.occupancy().project_grid(request).await)
     }
 
-    /// The map from above in tiles, each at a revision of its own: of a grid that is too large for one answer, or takes longer
-    /// than one may. [`Client::whole_grid`] joins them.
+    /// The map from above in tiles, each at a revision of its own: of a grid that is too large for one answer, or takes
+    /// longer than one may. [`Client::whole_grid`] joins them.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached; an error among the tiles is the last one.
@@ -225,8 +225,8 @@ impl Client {
         self.connection.answers(answers)
     }
 
-    /// The map from above, joined of tiles, with the versions of the first tile and of the last: equal where the map did not
-    /// change meanwhile.
+    /// The map from above, joined of tiles, with the versions of the first tile and of the last: equal where the map
+    /// did not change meanwhile.
     ///
     /// # Errors
     /// When the server refuses, cannot be reached, or sends tiles that make no grid.

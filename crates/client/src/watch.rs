@@ -8,9 +8,9 @@ use mrol_map::map::MapName;
 use mrol_service::{WatchMessage, WatchRequest};
 
 impl Client {
-    /// Tells of a map's changes as they become durable: of the whole state first where the request names no revision, or
-    /// one that is out of reach. It goes on until the answers are dropped, the map is deleted or the connection is lost;
-    /// [`super::Replica`] goes on after that as well.
+    /// Tells of a map's changes as they become durable: of the whole state first where the request names no revision,
+    /// or one that is out of reach. It goes on until the answers are dropped, the map is deleted or the connection is
+    /// lost; [`super::Replica`] goes on after that as well.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

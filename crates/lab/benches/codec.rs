@@ -1,5 +1,5 @@
-//! Messages: what a point query costs between the socket's bytes and the map, and back. And what is stored: the record of
-//! a scan, a map file.
+//! Messages: what a point query costs between the socket's bytes and the map, and back. And what is stored: the record
+//! of a scan, a map file.
 
 use bytes::Bytes;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};

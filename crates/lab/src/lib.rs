@@ -10,8 +10,8 @@
 //! * [`report`]: results as tables and plots in files.
 //! * [`cli`]: the program, `mrol-lab bench` and `mrol-lab experiment`.
 //!
-//! What [`measure`] and [`experiment`] time runs in this process, without a network. Benchmarks of single kernels are in
-//! `benches/`.
+//! What [`measure`] and [`experiment`] time runs in this process, without a network. Benchmarks of single kernels are
+//! in `benches/`.
 
 pub mod cli;
 pub mod experiment;

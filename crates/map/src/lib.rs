@@ -1,16 +1,16 @@
 //! The core of the map server: Ryde and Corso, *Fast Voxel Maps with Counting Bloom Filters* (IROS 2012).
 //!
-//! It knows no runtime, no protocol and no serialization. In reading order, which is also the order of the layers but for
-//! the last line, on which all of them stand: no two modules name each other, and a test says so.
+//! It knows no runtime, no protocol and no serialization. In reading order, which is also the order of the layers but
+//! for the last line, on which all of them stand: no two modules name each other, and a test says so.
 //!
 //! * [`voxel`], [`bloom`], [`geometry`]: keys, lattice and blocks (paper II-B, III); counting Bloom filters (II-A);
 //!   points and poses.
 //! * [`scan`], [`visibility`]: point-cloud files; what scans saw through.
 //! * [`map`]: the map itself (II, III) and its look-ups.
-//! * [`align`], [`planning`]: sequential alignment (III-A, III-B); what planners ask of a map: does a body fit, rays, the
-//!   nearest voxels, the map from above.
-//! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Begin here to see the whole before its
-//!   parts.
+//! * [`align`], [`planning`]: sequential alignment (III-A, III-B); what planners ask of a map: does a body fit, rays,
+//!   the nearest voxels, the map from above.
+//! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Begin here to see the whole
+//!   before its parts.
 //! * [`sync`], [`util`]: ranked locks; small tools that know nothing of maps.
 //!
 //! ```

@@ -58,8 +58,8 @@ fn keep_out(name: &str, is_there: bool) -> Change {
     Change::KeepOut(KeepOutRecord { change, request: Some(Request { id, digest: 1, caller: None }) })
 }
 
-/// What a reader was told: a revision, its keep-outs by the revisions that they made, and what is occupied of three points of each of two regions, exactly and by
-/// the filter, finest and at level 3.
+/// What a reader was told: a revision, its keep-outs by the revisions that they made, and what is occupied of three
+/// points of each of two regions, exactly and by the filter, finest and at level 3.
 #[derive(Debug, PartialEq)]
 struct Answer {
     revision: u64,

@@ -5,7 +5,7 @@
 //! Reading order of the rooms; none names a room of a later line:
 //!
 //! 1. `error`, `limits`, `request`: how a request fails, how much it may ask, what it asks and how it is answered.
-//! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, who may ask, who is told, threads.
+//! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
 //! 3. `commit`: how changes of a map become durable, then visible, then acknowledged.
 //! 4. `maps`: the maps by name, and what a hosted map is made of.
 //! 5. `map_service`: [`MapService`], the handle of which every operation is a method.
@@ -34,7 +34,7 @@ mod watch;
 mod work;
 
 pub use caller::{AllowedMaps, AllowedScans};
-pub use error::{ErrorCode, Reason, ServiceError, ToldBy};
+pub use error::{ErrorCode, Reason, ReportedBy, ServiceError};
 pub use limits::{Limits, Marks};
 pub use map_service::MapService;
 pub use maps::EVENTS_MAX;

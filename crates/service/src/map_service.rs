@@ -52,8 +52,8 @@ impl MapService {
         Ok(service)
     }
 
-    /// Opens the service before its maps are: [`MapService::open_maps`] opens them, and a request for one meanwhile waits
-    /// until it is open. Reads files: not for an async thread.
+    /// Opens the service before its maps are: [`MapService::open_maps`] opens them, and a request for one meanwhile
+    /// waits until it is open. Reads files: not for an async thread.
     ///
     /// # Errors
     /// When a setting is out of range, or the data folder cannot be read.
@@ -156,9 +156,10 @@ impl MapService {
         self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
     }
 
-    /// Prepares a change on a thread of `lane` in the requester's turn, or on `first` where there is one, and waits until it is made. Prepares
-    /// it again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it;
-    /// of one who goes away later the observers are told what the operation removed from the map all the same.
+    /// Prepares a change on a thread of `lane` in the requester's turn, or on `first` where there is one, and waits
+    /// until it is made. Prepares it again where the map has moved on meanwhile. A caller who goes away before the
+    /// change is submitted cancels it; of one who goes away later the observers are told what the operation removed
+    /// from the map all the same.
     pub(super) async fn submit_and_wait<A: Send + 'static>(
         &self,
         (operation, map): (&'static str, &Arc<HostedMap>),

@@ -1,4 +1,4 @@
-//! Observers of a service: who is told of each operation when it is over, for metrics and for the audit.
+//! Observers of a service: they are told of each operation when it is over, for metrics and for the audit.
 
 use std::fmt::Debug;
 use std::time::Duration;

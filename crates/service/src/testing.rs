@@ -14,7 +14,7 @@ impl MapService {
     /// When there is no such map, or the change fails.
     pub async fn make_change(&self, map: &MapName, change: Change) -> u64 {
         let map = self.map(map).await.expect("a map of that name");
-        let decided = Decided { change, record: None, lent: Vec::new(), pin: None };
+        let decided = Decided { change, record: None, reserved: Vec::new(), pin: None };
         let submission = Submission::Undecided(Box::new(|_, _| Ok(Some(decided))));
         let outcome = map
             .commit_queue

@@ -1,4 +1,5 @@
-//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled by far where rays cannot tell.
+//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled by far where rays
+//! cannot tell.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
@@ -128,5 +129,29 @@ fn a_robot_that_a_lift_took_up_unseen_is_not_believed_below() {
         let room_from_sensor = at(0.7, 0.2, 0.8, 0.5);
         let points = finite(lidar.scan(&floors[1], &room_from_sensor, &mut random));
         mapped.assert_not_misled(&points, Guess::Last, &(heights[1] * room_from_sensor), 2.0 * RESOLUTION_M);
+    }
+}
+
+/// Wheels that say nothing of a turn are wrong, and then speak for no pose that is turned otherwise either.
+#[test]
+fn a_robot_that_was_turned_in_place_against_its_odometry_is_not_believed_elsewhere() {
+    let lidar =
+        SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
+    for seed in 0..24 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mapped = Mapped::new();
+        let pieces = 2 + seed as usize % 2;
+        let room = Scene::rectangular_room(900 + seed, [9.0, 6.0], pieces);
+        let mut last = Pose::identity();
+        for k in 0..6 {
+            let mut somewhere = |half_m: f64| random.random_range(-half_m..half_m);
+            last = at(somewhere(2.0), somewhere(1.0), 0.8, f64::from(k));
+            mapped.add(&finite(lidar.scan(&room, &last, &mut random)), last);
+        }
+        let truth = last * at(0.0, 0.0, 0.0, std::f64::consts::PI);
+        let rearranged = Scene::rearranged_room(900 + seed, [9.0, 6.0], pieces, 1);
+        let points = finite(lidar.scan(&rearranged, &truth, &mut random));
+        let standing = Guess::Motion(Pose::identity());
+        mapped.assert_not_misled(&points, standing, &truth, 2.0 * RESOLUTION_M);
     }
 }

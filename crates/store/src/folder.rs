@@ -8,7 +8,7 @@ use super::file_system::FileSystem;
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::util::StopSignal;
 
-/// The path of a folder, shared by all who use it: a map may be renamed while it is open.
+/// The path of a folder, shared by all users: a map may be renamed while it is open.
 #[derive(Debug, Clone)]
 pub(super) struct FolderPath(Arc<Mutex<PathBuf>>);
 

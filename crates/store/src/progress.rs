@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use super::error::StoreError;
 
-/// Shared counters of the progress of opening maps; the readiness probe reads them. A clone is another handle on the same
-/// counters.
+/// Shared counters of the progress of opening maps; the readiness probe reads them. A clone is another handle on the
+/// same counters.
 #[derive(Debug, Clone, Default)]
 pub struct OpeningProgress(Arc<Counters>);
 

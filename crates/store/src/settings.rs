@@ -73,7 +73,7 @@ pub struct StoreSettings {
     pub trajectory_spacing: TrajectorySpacing,
     /// Size from which on a segment of the journal is ended, bytes. 64 MiB.
     pub segment_bytes_max: u64,
-    /// Most bytes of a map's last changes that are kept in memory for who watches it. 16 MiB.
+    /// Most bytes of a map's last changes that are kept in memory for its watchers. 16 MiB.
     pub watch_bytes_max: usize,
 }
 

@@ -45,8 +45,8 @@ pub fn revoke_in_file(path: &Path, name: &KeyName) -> Result<(), KeyFileError> {
     })
 }
 
-/// Gives a key another secret. The one before counts until `former_expires`, so that its holders may change one after the
-/// other; without that it ends at once.
+/// Gives a key another secret. The one before counts until `former_expires`, so that its holders may change one after
+/// the other; without that it ends at once.
 ///
 /// # Errors
 /// When there is no such key, its last rotation is not over and the former secret is to go on, or the file cannot be
@@ -116,7 +116,7 @@ fn lock(path: &Path) -> io::Result<File> {
     name.push(".lock");
     let file =
         OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(PathBuf::from(name))?;
-    // Who may change the keys may wait for the lock. Where that cannot be said, only its maker may.
+    // Whatever may change the keys may wait for the lock. Where that cannot be said, only its maker may.
     if let Ok(keys) = fs::metadata(path) {
         let _ = file.set_permissions(keys.permissions());
         let _ = fchown(&file, None, Some(keys.gid()));
@@ -129,7 +129,7 @@ fn lock(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Replaces a file, or makes one for its owner alone. Who may read it stays.
+/// Replaces a file, or makes one for its owner alone. Its readers stay.
 fn replace(path: &Path, text: &str) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut new = tempfile::NamedTempFile::new_in(folder)?;

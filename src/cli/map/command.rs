@@ -48,7 +48,7 @@ printed when --truth or --lookup is given.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
-    /// Scan files, or folders of them: .ply .pcd .xyz .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .f32
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters
@@ -72,7 +72,8 @@ pub(crate) struct Map {
     /// Put the scans at their true poses, without aligning
     #[arg(long, requires = "truth", conflicts_with = "first_pose")]
     at_truth: bool,
-    /// Share of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say [default: 0]
+    /// Share of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say [default:
+    /// 0]
     #[arg(long, value_name = "SHARE")]
     min_overlap: Option<f64>,
     /// Leave a robot lost once its scans are refused. Otherwise each refused scan is aligned from other guesses, then
@@ -87,11 +88,12 @@ pub(crate) struct Map {
     alignment: AlignmentOptions,
     #[command(flatten)]
     points: PointOptions,
-    /// Take points at exactly 0 0 0 as any other [default: they are skipped, as drivers write them where nothing returned]
+    /// Take points at exactly 0 0 0 as any other [default: they are skipped, as drivers write them where nothing
+    /// returned]
     #[arg(long)]
     keep_zeros: bool,
-    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It is
-    /// subtracted from them in double precision, and kept in the map
+    /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It
+    /// is subtracted from them in double precision, and kept in the map
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
     origin: Option<OriginChoice>,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]

@@ -28,7 +28,8 @@ const FRONTIER_HEIGHTS_M: [f64; 2] = [0.2, 2.2];
 const AROUND_M: f64 = 8.0;
 /// How far it drives between two scans, meters.
 const SCAN_EVERY_M: f64 = 0.6;
-/// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the robot does.
+/// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the
+/// robot does.
 const GIVEN_UP_M: f64 = 0.5;
 const VISITS_MAX: usize = 6;
 /// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
@@ -63,7 +64,8 @@ pub(crate) struct Explorer {
 }
 
 impl Explorer {
-    /// An explorer of `scene` that stands at x and y (meters), sees nothing yet, and maps into `map` on the server of `client`.
+    /// An explorer of `scene` that stands at x and y (meters), sees nothing yet, and maps into `map` on the server of
+    /// `client`.
     ///
     /// # Errors
     /// For a name that is none.
@@ -241,8 +243,8 @@ impl Explorer {
         [x, y]
     }
 
-    /// What the body must not meet: what is known to be there; and what is not known, but where the robot began and where it stands now,
-    /// which it knows to be free since it stands there.
+    /// What the body must not meet: what is known to be there; and what is not known, but where the robot began and
+    /// where it stands now, which it knows to be free since it stands there.
     fn surroundings(&self) -> [Surroundings; 2] {
         let [x, y, _] = self.path[0];
         let start = Region::Box {

@@ -48,7 +48,8 @@ fn point(place_m: [f64; 3]) -> Point {
 }
 
 impl Explorer {
-    /// The nearest place from which a frontier can be seen: where the server says, or else from where a ray to it meets nothing.
+    /// The nearest place from which a frontier can be seen: where the server says, or else from where a ray to it meets
+    /// nothing.
     pub(super) async fn nearest_goal(
         &self,
         frontiers: &[Frontier],

@@ -21,7 +21,8 @@ pub(super) fn body(room_m: f32) -> Body {
     Body::new(vec![link]).unwrap_or_else(|_| unreachable!("its numbers are in range"))
 }
 
-/// The space that a robot at x and y takes itself, with all of the voxels of 10 cm that it touches: half their diagonal more.
+/// The space that a robot at x and y takes itself, with all of the voxels of 10 cm that it touches: half their diagonal
+/// more.
 pub(super) fn own_place([x, y]: [f64; 2]) -> [Region; 3] {
     const MORE_M: f64 = 0.09;
     HEIGHTS_M.map(|z| Region::Sphere { center_m: [x, y, z], radius_m: BODY_RADIUS_M + MORE_M })

@@ -84,8 +84,8 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    /// The ways from `start` over places that a meter `costs` so much, infinite where the robot does not fit; each is asked once, when
-    /// it is reached.
+    /// The ways from `start` over places that a meter `costs` so much, infinite where the robot does not fit; each is
+    /// asked once, when it is reached.
     pub(super) fn from(grid: Grid, mut costs: impl FnMut(usize, [f64; 2]) -> f64, start: [f64; 2]) -> Self {
         let mut asked = vec![None; grid.count[0] * grid.count[1]];
         let mut ways =

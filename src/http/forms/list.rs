@@ -6,7 +6,8 @@ use std::marker::PhantomData;
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-/// A list of at most `MOST` entries: no more are read. For entries that may be shorter in JSON than what is made of them.
+/// A list of at most `MOST` entries: no more are read. For entries that may be shorter in JSON than what is made of
+/// them.
 #[derive(Debug)]
 pub(in crate::http) struct List<T, const MOST: usize>(pub(in crate::http) Vec<T>);
 

@@ -1,7 +1,7 @@
 //! What is said of JSON and of parameters that cannot be read: in the words of who wrote them.
 //!
-//! serde speaks of the types that a value was to become. Here its messages get the place of the value in the request, and
-//! what belongs there as JSON knows it.
+//! serde speaks of the types that a value was to become. Here its messages get the place of the value in the request,
+//! and what belongs there as JSON knows it.
 
 use serde::de::DeserializeOwned;
 

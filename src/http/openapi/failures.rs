@@ -13,7 +13,7 @@ use super::request_id::request_id;
 use crate::access::Operation;
 use crate::http::error::{PROBLEM_JSON, Problem, status_of};
 use crate::json::schema_of_words;
-use mrol_service::{Reason, ToldBy};
+use mrol_service::{Reason, ReportedBy};
 
 /// The statuses of failures that an operation may have.
 pub(super) fn of(operation: Operation) -> BTreeSet<StatusCode> {
@@ -57,7 +57,10 @@ pub(super) fn responses() -> impl Iterator<Item = (String, RefOr<Response>)> {
 
 /// The reasons that HTTP tells of.
 fn told() -> impl Iterator<Item = Reason> {
-    Reason::ALL.iter().copied().filter(|reason| matches!(reason.told_by(), ToldBy::Both | ToldBy::Http))
+    Reason::ALL
+        .iter()
+        .copied()
+        .filter(|reason| matches!(reason.reported_by(), ReportedBy::Both | ReportedBy::Http))
 }
 
 fn response(status: StatusCode) -> Response {

@@ -1,7 +1,7 @@
 //! Parts of an answer's object that may be missing as a whole.
 //!
-//! utoipa describes a flattened `Option` by its fields or null, and no object is null: every answer without the part would
-//! contradict its schema.
+//! utoipa describes a flattened `Option` by its fields or null, and no object is null: every answer without the part
+//! would contradict its schema.
 
 use utoipa::openapi::schema::{AnyOfBuilder, ObjectBuilder, OneOf, SchemaType, Type};
 use utoipa::openapi::{RefOr, Schema};

@@ -1,5 +1,6 @@
-//! `GET /v1/maps/{map}/block?level=&form=sparse|dense&min=x,y,z&max=x,y,z&cap_m=`: a part of a level, as masks of blocks of
-//! voxels or as the distance of each cell. JSON, or with `accept: application/octet-stream` bytes and headers.
+//! `GET /v1/maps/{map}/block?level=&form=sparse|dense&min=x,y,z&max=x,y,z&cap_m=`: a part of a level, as masks of
+//! blocks of voxels or as the distance of each cell. JSON, or with `accept: application/octet-stream` bytes and
+//! headers.
 
 use std::fmt::Write;
 
@@ -224,7 +225,8 @@ async fn as_json(
     }
 }
 
-/// Appends `{"block":[i,j,k],"mask":"..."}`: the mask's bytes as they are in the form of bytes, two hexadecimal digits each.
+/// Appends `{"block":[i,j,k],"mask":"..."}`: the mask's bytes as they are in the form of bytes, two hexadecimal digits
+/// each.
 fn write_block(text: &mut String, (block, mask): &(VoxelKey, BlockMask)) {
     let [x, y, z] = block.index();
     // Writing to a String cannot fail.

@@ -1,4 +1,5 @@
-//! `GET /v1/maps/{map}/events?since_number=&robot=`: what became of the last scans; and `/events/watch`, each as it comes.
+//! `GET /v1/maps/{map}/events?since_number=&robot=`: what became of the last scans; and `/events/watch`, each as it
+//! comes.
 //!
 //! A watch is a stream of lines, each a JSON document: an event, `{"heartbeat":true}` where there was none in a while,
 //! or at the end `{"error": ...}` with the problem document of what ended it.
@@ -79,7 +80,8 @@ pub(crate) async fn list(
 
 /// Tells of the events that a list would have, then of each as it comes, for as long as the client reads.
 ///
-/// Each line is a JSON document. A heartbeat says that there was no event in a while; the last line says why the watch ends.
+/// Each line is a JSON document. A heartbeat says that there was no event in a while; the last line says why the watch
+/// ends.
 #[utoipa::path(
     get,
     path = "/v1/maps/{map}/events/watch",

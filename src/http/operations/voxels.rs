@@ -1,5 +1,5 @@
-//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z&keep_out=&count_only=`: the occupied voxels of a level, those in a
-//! box or those that a camera sees (`map_from_camera=x,y,z,qx,qy,qz,qw&fov=h,v&range=near,far`), or their number.
+//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z&keep_out=&count_only=`: the occupied voxels of a level, those
+//! in a box or those that a camera sees (`map_from_camera=x,y,z,qx,qy,qz,qw&fov=h,v&range=near,far`), or their number.
 
 use std::fmt::Write;
 
@@ -19,8 +19,8 @@ use mrol_map::map::{Frustum, VoxelSelection};
 use mrol_map::voxel::VoxelKey;
 use mrol_service::{ListingRequest, Reason, ServiceError};
 
-/// Voxels that are written to JSON at once, about half a MiB, and the bytes of one at most: three numbers of eight characters,
-/// and what stands between them.
+/// Voxels that are written to JSON at once, about half a MiB, and the bytes of one at most: three numbers of eight
+/// characters, and what stands between them.
 const VOXELS: Pieces = Pieces { field: "voxels", items: 32_768, item_bytes: 29 };
 
 /// Which voxels.

@@ -1,8 +1,8 @@
-//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&since_content_hash=&since_state_hash=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`:
-//! the changes of a map.
+//! `GET /v1/maps/{map}/watch`: the changes of a map. Parameters: `since_revision`, `map_uuid`, `since_content_hash`,
+//! `since_state_hash`, `delta_level`, `min=x,y,z`, `max=x,y,z`, `viewpoints`.
 //!
-//! The answer is a stream of messages, each the protobuf message `WatchResponse` that gRPC sends (`occupancy.proto`) behind
-//! its length in four bytes, little-endian. It ends with a message that says why.
+//! The answer is a stream of messages, each the protobuf message `WatchResponse` that gRPC sends (`occupancy.proto`)
+//! behind its length in four bytes, little-endian. It ends with a message that says why.
 
 use std::convert::Infallible;
 
@@ -34,7 +34,8 @@ pub(crate) struct WatchParams {
     /// The map that this was a revision of.
     #[param(format = "uuid")]
     map_uuid: Option<String>,
-    /// The map's content hash at that revision, as the client was told: where the map had another, the whole state comes first.
+    /// The map's content hash at that revision, as the client was told: where the map had another, the whole state
+    /// comes first.
     since_content_hash: Option<String>,
     /// The state hash that was told with that revision, in sixteen hexadecimal digits: the same for keep-outs and
     /// viewpoints too.

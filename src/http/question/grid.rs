@@ -1,7 +1,7 @@
 //! `POST /v1/maps/{map}/grid`: the map from above, as a 2-D grid; `/grid/tiles`: a large one in tiles.
 //!
-//! Tiles are a stream of messages, each the protobuf message `GridTile` that gRPC sends (`planning.proto`) behind its length in
-//! four bytes, little-endian. Where they end early the last message says why.
+//! Tiles are a stream of messages, each the protobuf message `GridTile` that gRPC sends (`planning.proto`) behind its
+//! length in four bytes, little-endian. Where they end early the last message says why.
 
 use std::convert::Infallible;
 
@@ -157,8 +157,8 @@ pub(in crate::http) async fn project_grid(
 
 /// Projects the map from above to a 2-D grid that comes in tiles, each at a revision of its own.
 ///
-/// For grids that are too large for one answer, or take longer than one may. Where the tiles end before the last one, which
-/// is known by their number, the last message says why.
+/// For grids that are too large for one answer, or take longer than one may. Where the tiles end before the last one,
+/// which is known by their number, the last message says why.
 #[utoipa::path(
     post,
     path = "/v1/maps/{map}/grid/tiles",

@@ -17,7 +17,8 @@ use mrol_service::{Reason, ServiceError};
 pub(crate) const FILES: [&str; 3] = ["swagger-ui.css", "swagger-ui-bundle.js", START];
 const START: &str = "start.js";
 
-/// What the page may load and do. Swagger UI sets styles of its elements, and draws with images that are in its own files.
+/// What the page may load and do. Swagger UI sets styles of its elements, and draws with images that are in its own
+/// files.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
      img-src 'self' data:; connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'";
 

@@ -11,8 +11,8 @@ use crate::http::forms::NoParams;
 use mrol_map::util::excerpt;
 use mrol_service::{Reason, ServiceError};
 
-/// What the page may load and do: scripts, styles, pictures and requests of this server alone, no inline script, no form
-/// that leaves it, no frame around it.
+/// What the page may load and do: scripts, styles, pictures and requests of this server alone, no inline script, no
+/// form that leaves it, no frame around it.
 const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
      frame-ancestors 'none'; base-uri 'none'; form-action 'none'",

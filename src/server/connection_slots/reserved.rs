@@ -27,8 +27,8 @@ struct Guest {
     lost: CancellationToken,
 }
 
-/// One of so many reserved places and more of them are a flood where one peer takes them: 8 of 128. Fewer are a monitor's
-/// that makes several checks at once, and do not make it the peer that has most.
+/// One of so many reserved places and more of them are a flood where one peer takes them: 8 of 128. Fewer are a
+/// monitor's that makes several checks at once, and do not make it the peer that has most.
 const MONITORS: usize = 16;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

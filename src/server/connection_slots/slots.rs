@@ -14,8 +14,8 @@ use super::reserved::Reserved;
 use crate::access::Peer;
 use crate::admission::OfConnection;
 
-/// How long a client without a key may leave an answer unread while others find no place, and how old a connection is no
-/// newcomer any more.
+/// How long a client without a key may leave an answer unread while others find no place, and how old a connection is
+/// no newcomer any more.
 const GRACE: Duration = Duration::from_secs(1);
 
 /// The places of a protocol. A clone is another handle on the same ones.
@@ -143,8 +143,8 @@ impl Taken {
 }
 
 impl Connection {
-    /// Since when its client has had no request that was let in, or has read nothing of an answer where that is long enough
-    /// for others to go first.
+    /// Since when its client has had no request that was let in, or has read nothing of an answer where that is long
+    /// enough for others to go first.
     fn unused_since(&self) -> Option<Instant> {
         let unread = || self.unread.lock().values().min().copied().filter(|since| since.elapsed() >= GRACE);
         self.shared.idle_since().or_else(unread)

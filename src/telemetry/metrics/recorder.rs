@@ -77,8 +77,8 @@ struct Kept {
 }
 
 impl Metrics {
-    /// Robots whose scans are counted by name; the scans of all others are counted together. Names come from callers, and
-    /// a series is kept for as long as the server runs.
+    /// Robots whose scans are counted by name; the scans of all others are counted together. Names come from callers,
+    /// and a series is kept for as long as the server runs.
     pub const ROBOTS_MAX: usize = 100;
 
     /// Metrics that are all zero.
@@ -222,8 +222,8 @@ impl Metrics {
         self.0.maps.keep(names);
     }
 
-    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `lanes`, `maps` and those
-    /// that are `unavailable` as they are now: a map that is gone leaves nothing behind.
+    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `lanes`, `maps` and
+    /// those that are `unavailable` as they are now: a map that is gone leaves nothing behind.
     pub fn render(
         &self,
         lanes: &[LaneUse],

@@ -1,5 +1,5 @@
-//! Keep-outs over both protocols: put, replaced, removed, expired, listed; regarded by queries and listings that ask for it;
-//! told to who watches, kept across restarts, and of no concern to anything else.
+//! Keep-outs over both protocols: put, replaced, removed, expired, listed; regarded by queries and listings that ask
+//! for it; told to who watches, kept across restarts, and of no concern to anything else.
 
 mod changes;
 mod expiry;

@@ -70,7 +70,8 @@ async fn a_replica_of_a_region_answers_what_lies_in_it() {
         told.push(agrees(&part, &points, &of_server, "points[0]"));
         answered.push((told[0], told[2], told[3]));
     }
-    // Within 0.15 m and a voxel's diagonal of the border nothing is said; a voxel that is 0.2 m away is the nearest there is.
+    // Within 0.15 m and a voxel's diagonal of the border nothing is said; a voxel that is 0.2 m away is the nearest
+    // there is.
     let inside: Vec<_> = (0..20).filter(|i| answered[*i].0).collect();
     assert_eq!(inside, (6..=11).collect::<Vec<_>>(), "{answered:?}");
     assert!(answered[7] == (true, true, true) && !answered[6].1, "{answered:?}");

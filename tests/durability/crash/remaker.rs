@@ -1,6 +1,6 @@
 //! Who deletes a map, makes it again under its name, empty or of a map file, and puts scans in, until the server is
-//! killed. At times the disk fails while the map is made: then there is none. After each restart the map is the incarnation that was acknowledged last, with all that was put into it and
-//! nothing of any other.
+//! killed. At times the disk fails while the map is made: then there is none. After each restart the map is the
+//! incarnation that was acknowledged last, with all that was put into it and nothing of any other.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! `kill -9` at random moments under four writers, on the real program, round after round in one data folder: every
 //! acknowledged change is there after each restart, in its order, nothing is half applied, and the map is that of a
-//! plain model. Beside them a second map is deleted, made again and restored under its name all the time, on a disk that
-//! fails at times while it is made.
+//! plain model. Beside them a second map is deleted, made again and restored under its name all the time, on a disk
+//! that fails at times while it is made.
 //!
 //! Twenty rounds; `MROL_CRASH_ROUNDS=200 cargo test --test durability crash -- --nocapture` is the long form.
 

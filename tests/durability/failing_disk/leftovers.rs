@@ -1,4 +1,5 @@
-//! What a failed operation leaves, and what somebody else put there: the first is never served, the second never removed.
+//! What a failed operation leaves, and what somebody else put there: the first is never served, the second never
+//! removed.
 
 use std::cell::Cell;
 use std::convert::Infallible;

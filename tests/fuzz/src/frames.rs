@@ -1,5 +1,6 @@
 //! The frames of map files and journals, made by the description of their bytes alone (`crates/store/src/snapshots`,
-//! `crates/store/src/journal/segment.rs` and `frame.rs`): what is inside them reaches the decoders with right checksums.
+//! `crates/store/src/journal/segment.rs` and `frame.rs`): what is inside them reaches the decoders with right
+//! checksums.
 
 use uuid::Uuid;
 

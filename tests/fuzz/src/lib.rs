@@ -1,5 +1,5 @@
-//! What is fuzzed of files: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
-//! up, `tests/security/fuzz_corpus.rs` with the inputs that are kept.
+//! What is fuzzed of files: functions of bytes that panic where a promise is broken. The fuzzers call them with what
+//! they make up, `tests/security/fuzz_corpus.rs` with the inputs that are kept.
 
 mod frames;
 mod journal;

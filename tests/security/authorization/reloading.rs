@@ -13,8 +13,8 @@ use super::asking::{Outcome, over_grpc};
 use super::keyring::{Guarded, add};
 use crate::support::daemon::{PATIENCE, client, query_pb};
 
-/// Waits until listing maps with `key` is answered with `status`. An answer that is on its way while its key is withdrawn is cut
-/// off, which counts as another one.
+/// Waits until listing maps with `key` is answered with `status`. An answer that is on its way while its key is
+/// withdrawn is cut off, which counts as another one.
 async fn until(server: &Guarded, key: &Secret, status: StatusCode) {
     let start = Instant::now();
     let listed = || client().get(server.daemon.url("/v1/maps")).bearer_auth(key.reveal()).send();

@@ -146,7 +146,8 @@ impl<T: Plain> Array<T> {
     /// Writes the values; what is behind them stays as it is.
     pub(crate) fn write(&self, values: impl IntoIterator<Item = T>) {
         for (i, value) in values.into_iter().take(self.count).enumerate() {
-            // SAFETY: the program promises so many, which nobody else has: they are no answer's, and nothing that is asked.
+            // SAFETY: the program promises so many, which nobody else has: they are no answer's, and nothing that is
+            // asked.
             unsafe { self.to.add(i).write(value) };
         }
     }

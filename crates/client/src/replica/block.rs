@@ -9,14 +9,14 @@ use mrol_map::voxel::Lattice;
 use mrol_service::{BlockAnswer, BlockRequest, Limits, Reason, ServiceError};
 
 impl Replica {
-    /// A part of a level as it is stored, or the distance of each of its cells from what is occupied, at one revision: as
-    /// [`Client::get_block`](crate::Client::get_block), under the default limits of a server. A dense block takes some
-    /// milliseconds and more: not for an async thread.
+    /// A part of a level as it is stored, or the distance of each of its cells from what is occupied, at one revision:
+    /// as [`Client::get_block`](crate::Client::get_block), under the default limits of a server. A dense block takes
+    /// some milliseconds and more: not for an async thread.
     ///
     /// # Errors
-    /// Of a copy that is older than the options allow; for a level that is none, a part that is not all in the region that is
-    /// copied (of a dense block with what lies within its cap), a block beyond the limits, and a dense block that is no box of
-    /// finite sides.
+    /// Of a copy that is older than the options allow; for a level that is none, a part that is not all in the region
+    /// that is copied (of a dense block with what lies within its cap), a block beyond the limits, and a dense block
+    /// that is no box of finite sides.
     pub fn get_block(&self, request: &BlockRequest) -> Result<BlockAnswer, ReplicaError> {
         self.shared.check_age(self.age_max)?;
         let Copied { map, map_uuid, .. } = self.shared.copied.read().clone();
@@ -29,7 +29,8 @@ impl Replica {
         Ok(answer)
     }
 
-    /// Refuses cells of which the replica does not know everything. A region that holds the corners of a box holds all of it.
+    /// Refuses cells of which the replica does not know everything. A region that holds the corners of a box holds all
+    /// of it.
     fn check_cells(&self, cells: Option<CellBox>, lattice: &Lattice, level: u32) -> Result<(), ReplicaError> {
         let Some(region) = &self.region else { return Ok(()) };
         let is_copied = |cells: CellBox| {

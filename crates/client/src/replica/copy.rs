@@ -39,8 +39,8 @@ pub(super) enum Applied {
     Changed,
 }
 
-/// Builds the copy. What a server sends is not believed: revisions must follow each other, sizes are bounded, and where the
-/// whole map is copied, every hash that the server tells must be that of the copy.
+/// Builds the copy. What a server sends is not believed: revisions must follow each other, sizes are bounded, and where
+/// the whole map is copied, every hash that the server tells must be that of the copy.
 #[derive(Debug)]
 pub(super) struct Builder {
     /// Finest blocks that the copy, or one change, may have.
@@ -119,7 +119,7 @@ impl Builder {
         self.copied = None;
     }
 
-    /// Applies a message. Takes as long as the change is large, and waits for who reads the copy.
+    /// Applies a message. Takes time in proportion to the change, and waits for readers of the copy.
     ///
     /// # Errors
     /// For a message that cannot follow on those before it.

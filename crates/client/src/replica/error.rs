@@ -15,8 +15,8 @@ pub enum ReplicaError {
     /// What the server sent makes no sense.
     #[error("the server's messages are damaged: {0}")]
     Damaged(String),
-    /// The copy holds other voxels than the map at the same revision, as after an older data folder was put back. It is copied
-    /// anew.
+    /// The copy holds other voxels than the map at the same revision, as after an older data folder was put back. It is
+    /// copied anew.
     #[error(
         "the copy differs from the map at revision {revision}: its content hash is {copy}, the map's {map}; the server goes on \
          from an older data folder than the copy was made of. The whole map is copied again"

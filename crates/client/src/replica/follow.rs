@@ -23,8 +23,8 @@ use mrol_service::{WatchForm, WatchMessage, WatchRequest};
 const PAUSE: Duration = Duration::from_millis(100);
 const PAUSE_MAX: Duration = Duration::from_secs(5);
 
-/// How often in a row a server refuses a key before it is not asked again: it writes a line of its audit each time, and a
-/// key that was withdrawn comes back by no asking.
+/// How often in a row a server refuses a key before it is not asked again: it writes a line of its audit each time, and
+/// a key that was withdrawn comes back by no asking.
 const KEY_REFUSALS_MAX: u32 = 4;
 
 /// True where the server does not know the key, or does not let its holder watch the map.
@@ -65,7 +65,7 @@ impl Follower {
         self.client.watch(&self.map, request).await
     }
 
-    /// Applies a message, on a thread that may wait for who reads the copy.
+    /// Applies a message, on a thread that may wait for readers of the copy.
     async fn apply(&mut self, message: WatchMessage) -> Result<Applied, ReplicaError> {
         if matches!(message.event, mrol_service::WatchEvent::Heartbeat) {
             return Ok(Applied::Nothing);

@@ -15,12 +15,13 @@ use crate::client::Client;
 use mrol_map::map::{MapName, MultiResolutionMap, Region};
 use mrol_service::{Reason, ServiceError};
 
-/// A copy of a map, or of a part of it, that follows the server's: it answers in this process, at a revision that it names.
+/// A copy of a map, or of a part of it, that follows the server's: it answers in this process, at a revision that it
+/// names.
 ///
-/// A task of the runtime that opened it follows the map until the replica is dropped. Where the connection breaks it comes back
-/// and goes on from the last revision, so that it misses nothing and tells nothing twice; meanwhile the copy answers as it is,
-/// up to the age that its options allow. Where the server refuses its key a few times in a row it follows no longer. A map that
-/// was deleted and made again is another one, by its uuid, and is copied anew.
+/// A task of the runtime that opened it follows the map until the replica is dropped. Where the connection breaks it
+/// comes back and goes on from the last revision, so that it misses nothing and tells nothing twice; meanwhile the copy
+/// answers as it is, up to the age that its options allow. Where the server refuses its key a few times in a row it
+/// follows no longer. A map that was deleted and made again is another one, by its uuid, and is copied anew.
 #[derive(Debug)]
 pub struct Replica {
     pub(super) shared: Arc<Shared>,
@@ -94,8 +95,8 @@ impl Replica {
     /// The copy: all that a map answers can be asked of it. It changes as the server's does, and a view of it is of one
     /// revision. A map that was made again is another one: ask for it anew now and then.
     ///
-    /// It has the map's viewpoints unless the options say otherwise, of a region those that looked into it. It has no moments, so
-    /// that alignment finds poses by overlap alone, and no trajectory.
+    /// It has the map's viewpoints unless the options say otherwise, of a region those that looked into it. It has no
+    /// moments, so that alignment finds poses by overlap alone, and no trajectory.
     pub fn map(&self) -> Arc<MultiResolutionMap> {
         Arc::clone(&self.shared.copied.read().map)
     }

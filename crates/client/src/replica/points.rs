@@ -14,8 +14,8 @@ impl Replica {
     /// revision; `min_revision` is not waited for.
     ///
     /// # Errors
-    /// Of a copy that is older than the options allow; for a point in no voxel or outside of the region that is copied, named
-    /// by its place; a level that is none; another uuid than the map's; a `min_revision` that the copy has not.
+    /// Of a copy that is older than the options allow; for a point in no voxel or outside of the region that is copied,
+    /// named by its place; a level that is none; another uuid than the map's; a `min_revision` that the copy has not.
     pub fn query_points(&self, query: &PointQuery) -> Result<PointAnswer, ReplicaError> {
         self.shared.check_age(self.age_max)?;
         let Copied { map, map_uuid, .. } = self.shared.copied.read().clone();

@@ -13,9 +13,9 @@ impl Replica {
     /// [`Limits::default`].
     ///
     /// # Errors
-    /// `ReplicaStale` of a copy that is older than the options allow; for what makes no question; a level that is none; another
-    /// uuid than the map's; a `min_revision` that the copy has not; of a copy of a region, `PointOutOfRange` where what lies
-    /// beyond the region could change the answer.
+    /// `ReplicaStale` of a copy that is older than the options allow; for what makes no question; a level that is none;
+    /// another uuid than the map's; a `min_revision` that the copy has not; of a copy of a region, `PointOutOfRange`
+    /// where what lies beyond the region could change the answer.
     pub fn ask<Q: Question>(&self, question: &Q) -> Result<Answered<Q::Answer>, ReplicaError> {
         self.shared.check_age(self.age_max)?;
         let limits = Limits::default();

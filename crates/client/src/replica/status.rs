@@ -19,6 +19,7 @@ pub struct ReplicaStatus {
     pub resets: u64,
     /// Why the last watch ended, where it did.
     pub last_error: Option<String>,
-    /// True once the replica follows no longer, since the server refused its key again and again: the copy stays as it is.
+    /// True once the replica follows no longer, since the server refused its key again and again: the copy stays as it
+    /// is.
     pub has_ended: bool,
 }

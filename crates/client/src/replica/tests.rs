@@ -38,7 +38,7 @@ fn image(distance_m: f32) -> RangeImage {
     RangeImage::of_points(&points, Sweep::standing(90.0), 8192).unwrap()
 }
 
-/// Somebody who has a copy, and comes back now and then.
+/// A client that has a copy, and reconnects now and then.
 struct Follower {
     options: ReplicaOptions,
     builder: Builder,
@@ -135,7 +135,7 @@ fn seen_in_region(viewpoints: &ViewpointSet) -> Vec<u64> {
     let points: Vec<_> = points.collect();
     let has_seen = |revision: &u64| {
         let viewpoint = viewpoints.get(*revision).unwrap();
-        points.iter().any(|point| region().contains(*point) && viewpoint.sees_through(*point))
+        points.iter().any(|point| region().contains(*point) && viewpoint.is_free(*point))
     };
     viewpoints.iter().map(|(revision, _)| revision).filter(has_seen).collect()
 }

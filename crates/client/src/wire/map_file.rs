@@ -9,8 +9,8 @@ use mrol_service::MapFile;
 /// Bytes of a piece.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// Bytes of memory that a file of so many bytes takes until its last message is sent: itself, and a message, written with
-/// room for twice as much.
+/// Bytes of memory that a file of so many bytes takes until its last message is sent: itself, and a message, written
+/// with room for twice as much.
 pub fn snapshot_bytes(file_bytes: usize) -> usize {
     file_bytes + 2 * file_bytes.min(PIECE_BYTES)
 }

@@ -109,8 +109,8 @@ impl From<Frustum> for pb::View {
     }
 }
 
-/// Bytes of memory that a listing of so many voxels takes until its last message is sent: its keys, and three messages, one
-/// that is made and one that is sent, written with room for twice as much.
+/// Bytes of memory that a listing of so many voxels takes until its last message is sent: its keys, and three messages,
+/// one that is made and one that is sent, written with room for twice as much.
 pub fn listing_bytes(voxels: usize) -> usize {
     size_of::<VoxelKey>() * (voxels + 3 * voxels.min(KEYS_PER_CHUNK))
 }

@@ -50,8 +50,8 @@ pub struct CarvingFigures {
     pub box_voxels: (usize, usize),
     /// Voxels of the walker's trail in a map that does not carve, and how many of them are left in the one that does.
     pub trail_voxels: (usize, usize),
-    /// Voxels of walls, floor, ceiling and furniture in a map that does not carve, and how many of them are left in the one
-    /// that does.
+    /// Voxels of walls, floor, ceiling and furniture in a map that does not carve, and how many of them are left in the
+    /// one that does.
     pub still_voxels: (usize, usize),
     /// Scans that carved and were accepted, and those that did not carve.
     pub accepted: (usize, usize),
@@ -214,8 +214,8 @@ impl CarvingMapper {
         })
     }
 
-    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first.
-    /// True of one that fits.
+    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the
+    /// first. True of one that fits.
     ///
     /// # Errors
     /// When it cannot be mapped.

@@ -68,8 +68,8 @@ fn ride(scans: usize) -> Vec<(Pose, Option<Twist>)> {
     ride
 }
 
-/// The errors of the poses of `scans` scans of `robot` but the first one, which all go into `map`, an empty one; none of
-/// a scan that was refused.
+/// The errors of the poses of `scans` scans of `robot` but the first one, which all go into `map`, an empty one; none
+/// of a scan that was refused.
 ///
 /// # Errors
 /// When a scan cannot be mapped.

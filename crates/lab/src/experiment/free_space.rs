@@ -1,4 +1,5 @@
-//! Experiment on free space: what viewpoints say of the voxels that another library calls free or occupied, from the same scans.
+//! Experiment on free space: what viewpoints say of the voxels that another library calls free or occupied, from the
+//! same scans.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
@@ -147,12 +148,12 @@ impl States {
     /// The states of finest voxels in a view that has viewpoints.
     pub fn of(view: &MapView<'_>, voxels: &[VoxelKey]) -> Self {
         let mut states = Self::default();
-        let mut gaze = view.viewpoints().map(|viewpoints| viewpoints.gaze());
+        let mut cache = view.viewpoints().map(|viewpoints| viewpoints.cache());
         for &voxel in voxels {
             let center_m = view.lattice().center_m(voxel, 0);
             let state = if view.contains(voxel, 0) {
                 &mut states.occupied
-            } else if gaze.as_mut().is_some_and(|gaze| gaze.sees_through(center_m)) {
+            } else if cache.as_mut().is_some_and(|cache| cache.is_free(center_m)) {
                 &mut states.free
             } else {
                 &mut states.unknown

@@ -36,8 +36,8 @@ impl Round {
     }
 }
 
-/// Drives for so many scans through the building of `seed`, 0.6 m/s and 10 scans a second, and maps them into `map`, an empty one;
-/// `told` hears what the map keeps after each round, and after the last scan.
+/// Drives for so many scans through the building of `seed`, 0.6 m/s and 10 scans a second, and maps them into `map`, an
+/// empty one; `told` hears what the map keeps after each round, and after the last scan.
 ///
 /// # Errors
 /// When a scan cannot be mapped.

@@ -36,8 +36,8 @@ impl Ledger {
         self.0.lock().last_key_value().map_or(0, |(revision, _)| *revision)
     }
 
-    /// Compares hashes of the revisions that are in the ledger: an operation of the tally is a comparison, an error a difference,
-    /// and its time how much later it was seen than acknowledged; 0 where it was seen first.
+    /// Compares hashes of the revisions that are in the ledger: an operation of the tally is a comparison, an error a
+    /// difference, and its time how much later it was seen than acknowledged; 0 where it was seen first.
     pub(crate) fn compare(&self, seen: &[Sighting]) -> Result<Tally, FleetError> {
         let (acknowledged, mut tally) = (self.0.lock(), Tally::new()?);
         for Sighting { revision, hash, at } in seen {

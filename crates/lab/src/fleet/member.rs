@@ -35,8 +35,8 @@ impl<M: Member> Fleet<M> {
         Self { members, number: 0 }
     }
 
-    /// Starts the members for `time`, at `rate` operations a second in total, of which those are left out that are late by
-    /// a whole period.
+    /// Starts the members for `time`, at `rate` operations a second in total, of which those are left out that are late
+    /// by a whole period.
     pub(crate) fn work_skipping(self, rate: f64, time: Duration) -> Result<Working<M>, FleetError> {
         let pace = Pace::new(Some(rate), time, self.number).skipping();
         self.work_at(pace)

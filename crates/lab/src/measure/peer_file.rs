@@ -18,8 +18,8 @@ const MAGIC: &[u8; 8] = b"mrolpeer";
 /// u64   number of voxels, then for each
 ///       i32 x 3   its index; it is the cube from index * side to (index + 1) * side
 /// u64   number of queries, then for each
-///       f32 x N   a point x y z (N = 3); a ray: its origin x y z and its direction (N = 6); or the spheres of an arm: the
-///                 center x y z and the radius of each (N = 4 * 59); meters
+///       f32 x N   a point x y z (N = 3); a ray: its origin x y z and its direction (N = 6); or the spheres of an arm:
+///                 the center x y z and the radius of each (N = 4 * 59); meters
 ///       f32       the answer: a distance, meters, or infinity
 /// ```
 ///

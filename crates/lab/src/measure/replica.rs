@@ -1,4 +1,5 @@
-//! Measurement of a replica's queries: the same ones through the replica, and through its map as `mrol-lab bench lookup` asks.
+//! Measurement of a replica's queries: the same ones through the replica, and through its map as `mrol-lab bench
+//! lookup` asks.
 
 use super::stopwatch::Runs;
 use crate::rivals::{Structure, ThroughMap};

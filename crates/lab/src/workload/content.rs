@@ -59,8 +59,8 @@ impl Workload {
         }
     }
 
-    /// Makes rays from places on the sensor's path: in a room in all directions, on a site those that its sensor looks in.
-    /// Scattered voxels have no path; all places are in their middle.
+    /// Makes rays from places on the sensor's path: in a room in all directions, on a site those that its sensor looks
+    /// in. Scattered voxels have no path; all places are in their middle.
     pub fn shots(&self, layout: ShotLayout) -> Shots {
         match self {
             Self::Room(room) => Shots::of(layout, EVERYWHERE_DEG, |place| room.sensor(place)),

@@ -1,8 +1,9 @@
 //! Agreement of rays: whether a scan at a pose and the scans before it saw the same surfaces.
 //!
-//! A point of the scan is looked for in the images of earlier viewpoints, and what these met in the image of the scan. It *agrees*
-//! where something was met there, it is *contradicted* where all that was met lies behind it, and what nobody saw says nothing.
-//! So neither the density of a map nor the spacing of rays against its voxels plays a part, and new ground is no argument.
+//! A point of the scan is looked for in the images of earlier viewpoints, and what these met in the image of the scan.
+//! It *agrees* where something was met there, it is *contradicted* where all that was met lies behind it, and what
+//! nobody saw says nothing. So neither the density of a map nor the spacing of rays against its voxels plays a part,
+//! and new ground is no argument.
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Elsewhere: poses at which a scan may fit as well as at one where it was found, looked for with a few points.
 //!
-//! In a rectangular room a robot that turned unseen fits the walls twice or four times, along an aisle at every upright. Few points on
-//! coarse voxels tell cheaply where; whether a scan was taken there is for rays to say.
+//! In a rectangular room a robot that turned unseen fits the walls twice or four times, along an aisle at every
+//! upright. Few points on coarse voxels tell cheaply where; whether a scan was taken there is for rays to say.
 
 use std::cmp::Reverse;
 use std::f64::consts::TAU;
@@ -44,22 +44,30 @@ struct Few<'a> {
     stop: StopSignal<'a>,
 }
 
-/// Where a scan that was found at `pose` may fit as well, turned about the map's z axis.
+/// Where a scan that was found at `pose` may fit as well, turned about the map's z axis: there, and at `guess`, where
+/// that lies elsewhere. A robot that turned in a room is found on its other side, where its walls look the same.
 pub(super) fn turned(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
     pose: &Pose,
+    guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_TURNS, settings);
-    let guesses = (1..YAWS).map(|yaw| {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (TAU * f64::from(yaw) / f64::from(YAWS)));
-        Pose::from_parts(pose.translation, turn * pose.rotation)
-    });
-    few.as_good(pose, guesses.collect(), map.settings().levels - 1)
+    let about = |translation: Translation3<f64>| {
+        (0..YAWS).map(move |yaw| {
+            let yaw = TAU * f64::from(yaw) / f64::from(YAWS);
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * yaw);
+            Pose::from_parts(translation, turn * pose.rotation)
+        })
+    };
+    let at_guess = few.is_elsewhere(pose, &Pose::from_parts(guess.translation, pose.rotation));
+    let at_guess = at_guess.then(|| about(guess.translation)).into_iter().flatten();
+    few.as_good(pose, about(pose.translation).skip(1).chain(at_guess).collect(), map.settings().levels - 1)
 }
 
-/// Where a scan that was found at `pose` may fit as well, shifted along `axes` (of length 1, map frame) by up to `possible_m`, either way.
+/// Where a scan that was found at `pose` may fit as well, shifted along `axes` (of length 1, map frame) by up to
+/// `possible_m`, either way.
 pub(super) fn shifted(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
@@ -111,8 +119,8 @@ impl<'a> Few<'a> {
         Overlap::new(self.map, &self.points, level, self.settings.lookup)
     }
 
-    /// The ends of ascents from `guesses`, from the level `coarsest` on, that are as good as `pose`, each elsewhere than that and the
-    /// others.
+    /// The ends of ascents from `guesses`, from the level `coarsest` on, that are as good as `pose`, each elsewhere
+    /// than that and the others.
     fn as_good(&self, pose: &Pose, guesses: Vec<Pose>, coarsest: u32) -> Vec<Pose> {
         let climbed = guesses.into_iter().map(|guess| {
             let mut ascent = Ascent::from(guess);

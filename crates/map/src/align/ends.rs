@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use nalgebra::Vector3;
 
-use super::agreement::{RayAgreement, Rays, Rival};
+use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::fit::Fit;
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
@@ -18,23 +18,27 @@ use crate::util::StopSignal;
 /// Poses that differ by less than this many r_0 and less than [`SAME_DEG`] are the same place.
 const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
-/// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see nothing of each other
-/// cannot be compared.
+/// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
+/// nothing of each other cannot be compared.
 const EVIDENCE_MIN: f64 = 0.2;
 const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
-/// Least share of points that agree, of those of which anything is known: of the better side near the guess, since people and what was
-/// moved contradict one side only; farther away, where some pose of many fits by chance, of both.
+/// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
+/// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
 const AGREEMENT_MIN: f64 = 0.9;
-/// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing else is known, and a
-/// tilt of one, degrees; other places are looked for up to so many meters, three of them. Its yaw does not count: the robot may have been
-/// turned unseen.
+/// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing
+/// else is known, and a tilt of one, degrees; other places are looked for up to so many meters, three of them. Its yaw
+/// does not count: the robot may have been turned unseen.
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
 const REACH_M: f64 = 3.0 * WIDE_M;
-/// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the witnesses contradict
-/// each other.
+/// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the
+/// witnesses contradict each other.
 const CONTRADICTED_MIN: f64 = 0.005;
 const UNUSUAL: f64 = 2.0;
+/// Standard deviations from the guess beyond which what is known beforehand is known to be wrong, as where wheels
+/// slipped or the robot was carried: it then tells no pose from another. One pose in a thousand lies farther by chance,
+/// the square root of the quantile of chi squared with six degrees of freedom.
+const DEVIATIONS_MAX: f64 = 4.7;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
 
@@ -130,8 +134,8 @@ impl<'a> Ends<'a> {
         }
     }
 
-    /// Adds witnesses near the ends that the present witnesses did not see, and compares all ends anew. Witnesses on one floor see
-    /// nothing of another.
+    /// Adds witnesses near the ends that the present witnesses did not see, and compares all ends anew. Witnesses on
+    /// one floor see nothing of another.
     pub(super) fn hear_further_witnesses(&mut self, map: &MultiResolutionMap) {
         let unseen = self.all.iter().filter(|end| !has_evidence(&end.agreement));
         let poses: Vec<Pose> = unseen.map(|end| end.fit.map_from_sensor).collect();
@@ -215,27 +219,40 @@ impl<'a> Ends<'a> {
         best.or_else(|| self.all.iter().max_by(by_fitness)).unwrap_or(&self.all[0])
     }
 
-    /// The rivals of `best`, other poses that may be the true one: ends elsewhere whose cost is little more; ends that rays clearly prefer,
-    /// since what is known beforehand may be too sure of itself; and [the guess](Self::rival_at_guess).
-    ///
-    /// An end with an open direction is not believed, but it is possible.
+    /// The rivals of `best`: [ends elsewhere that may be the true pose](Self::is_rival), and [the
+    /// guess](Self::rival_at_guess).
     pub(super) fn rivals_of(&self, best: &End) -> Vec<Rival> {
         let Some(preferred) = self.preferred() else { return Vec::new() };
-        let own = best.cost(preferred);
-        let is_elsewhere = |pose: &Pose| !is_same_place(pose, &best.fit.map_from_sensor, self.resolution_m);
-        let is_as_likely = |end: &&End| {
-            end.cost(preferred) - own <= RIVAL
-                || best.is_contradicted_more_than(end) >= RIVAL.sqrt()
-                || end.deviations < best.deviations && self.is_usual(end)
+        let is_elsewhere = |end: &&End| {
+            !is_same_place(&end.fit.map_from_sensor, &best.fit.map_from_sensor, self.resolution_m)
         };
-        let ends = self.all.iter().filter(|end| has_evidence(&end.agreement));
-        let ends = ends.filter(|end| is_elsewhere(&end.fit.map_from_sensor)).filter(is_as_likely);
+        let ends = self.all.iter().filter(|end| has_evidence(&end.agreement)).filter(is_elsewhere);
+        let rivals = ends.filter(|end| self.is_rival(end, best, preferred));
         let of_end = |end: &End| Rival { map_from_sensor: end.fit.map_from_sensor, agreement: end.agreement };
-        ends.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
+        rivals.map(of_end).chain(self.rival_at_guess(best, preferred)).collect()
     }
 
-    /// True of an end that may be believed, and that rays contradict on one side hardly more than the witnesses contradict each other. Where
-    /// the scan comes to new ground, it is seen askew, and rays contradict the true pose a little more than one where all is known.
+    /// True of an end that may be the true pose instead of `best`. One with an open direction is not believed, but it
+    /// is possible.
+    fn is_rival(&self, end: &End, best: &End, preferred: &End) -> bool {
+        let is_as_likely = end.cost(preferred) - best.cost(preferred) <= RIVAL;
+        // What is known beforehand may be too sure of itself: wheels slip.
+        let is_preferred_by_rays = best.is_contradicted_more_than(end) >= RIVAL.sqrt();
+        // On new ground, and where things were moved, rays contradict the true pose too: they do not outweigh the
+        // guess.
+        let is_nearer = end.deviations < best.deviations
+            && end.against.is_none()
+            && (self.is_usual(end) || !self.is_usual(best));
+        // A single thing that came or went may be all that speaks against it, unless that is much.
+        let is_contradicted_one_way = end.agreement.worse() >= AGREEMENT_MIN
+            && end.is_as_near_as(best)
+            && !end.is_contradicted_both_ways_more_than(best);
+        is_as_likely || is_preferred_by_rays || is_nearer || is_contradicted_one_way
+    }
+
+    /// True of an end that may be believed, and that rays contradict on one side hardly more than the witnesses
+    /// contradict each other. Where the scan comes to new ground, it is seen askew, and rays contradict the true pose a
+    /// little more than one where all is known.
     pub(super) fn is_usual(&self, end: &End) -> bool {
         let RayAgreement { of_scan, of_map } = end.agreement;
         let both = of_scan.contradicted_share().min(of_map.contradicted_share());
@@ -243,8 +260,8 @@ impl<'a> Ends<'a> {
             && (both <= CONTRADICTED_MIN || both <= UNUSUAL * self.contradicted_among_witnesses())
     }
 
-    /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard deviations
-    /// away from it.
+    /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard
+    /// deviations away from it.
     ///
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
     fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {
@@ -272,19 +289,40 @@ impl<'a> Ends<'a> {
 }
 
 impl End {
-    /// What is known beforehand and what rays say against this end, in squared standard deviations; rays against the end that they
-    /// prefer.
+    /// What is known beforehand and what rays say against this end, in squared standard deviations; rays against the
+    /// end that they prefer.
     pub(super) fn cost(&self, preferred: &Self) -> f64 {
         cost(self.deviations, &self.look, &preferred.look)
+    }
+
+    /// True of an end at which what is known beforehand is known to be wrong.
+    pub(super) fn is_beyond_odometry(&self) -> bool {
+        self.deviations > DEVIATIONS_MAX
     }
 
     /// How much more rays contradict this end than another, in standard deviations.
     fn is_contradicted_more_than(&self, other: &Self) -> f64 {
         self.look.contradicted_more_than(&other.look)
     }
+
+    /// True where rays contradict a larger share of the scan and a larger share of what earlier scans met than at
+    /// another end. One alone may be a thing that came or went, as after a piece of furniture was moved.
+    fn is_contradicted_both_ways_more_than(&self, other: &Self) -> bool {
+        let more = |of: fn(&RayAgreement) -> RayCounts| {
+            let [here, there] = [self, other].map(|end| of(&end.agreement).contradicted_share());
+            here - there > CONTRADICTED_MIN
+        };
+        more(|agreement| agreement.of_scan) && more(|agreement| agreement.of_map)
+    }
+
+    /// True where what is known beforehand does not tell it from another end.
+    fn is_as_near_as(&self, other: &Self) -> bool {
+        cost_of_prior(self.deviations) - cost_of_prior(other.deviations) <= RIVAL
+    }
 }
 
-/// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is known.
+/// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is
+/// known.
 fn is_hardly_contradicted(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
     of_scan.contradicted_share().min(of_map.contradicted_share()) <= 1.0 - AGREEMENT_MIN
 }
@@ -295,8 +333,9 @@ fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
     a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
-/// The order of places that a search found, each with how rays agree there and its overlap: first those at which the scan
-/// and earlier scans saw enough of each other, by the smaller share of rays that agree; then the others, by overlap.
+/// The order of places that a search found, each with how rays agree there and its overlap: first those at which the
+/// scan and earlier scans saw enough of each other, by the smaller share of rays that agree; then the others, by
+/// overlap.
 fn in_rank(
     (rays, overlap): &(RayAgreement, f64),
     (of_other, overlap_of_other): &(RayAgreement, f64),
@@ -308,13 +347,17 @@ fn in_rank(
 /// [`End::cost`] of a pose that is so many standard deviations from the guess.
 fn cost(deviations: f64, look: &Look, preferred: &Look) -> f64 {
     let z = look.contradicted_more_than(preferred).max(0.0);
-    deviations * deviations + z * z
+    cost_of_prior(deviations) + z * z
+}
+
+/// What is known beforehand against a pose that is so many standard deviations from the guess, squared ones.
+pub(super) fn cost_of_prior(deviations: f64) -> f64 {
+    deviations.min(DEVIATIONS_MAX).powi(2)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::agreement::RayCounts;
 
     #[test]
     fn places_are_ranked_by_the_rays_that_agree_and_by_overlap_where_nothing_is_known() {

@@ -6,7 +6,7 @@ use crate::geometry::Point;
 use crate::util::StopSignal;
 
 /// Points between two checks of the stop signal: far below a millisecond.
-const POINTS_PER_LOOK: usize = 64 << 10;
+const POINTS_PER_STOP_CHECK: usize = 64 << 10;
 
 /// The points within `extent_m` of the sensor. An ordinary scan has no others and is returned without a copy.
 ///
@@ -19,8 +19,8 @@ pub(super) fn within_extent<'a>(
 ) -> Cow<'a, [Point]> {
     let is_near = |point: &Point| point.to_f64().coords.norm() <= extent_m;
     let mut near: Option<Vec<Point>> = None;
-    for (chunk, points_of_chunk) in points.chunks(POINTS_PER_LOOK).enumerate() {
-        let before = &points[..chunk * POINTS_PER_LOOK];
+    for (chunk, points_of_chunk) in points.chunks(POINTS_PER_STOP_CHECK).enumerate() {
+        let before = &points[..chunk * POINTS_PER_STOP_CHECK];
         if stop.is_stopped() {
             return near.map_or(Cow::Borrowed(before), Cow::Owned);
         }
@@ -53,6 +53,6 @@ mod tests {
         let looks = std::cell::Cell::new(0);
         let count = || looks.replace(looks.get() + 1) == usize::MAX;
         within_extent(&mixed, 1e3, StopSignal::when(&count));
-        assert_eq!(looks.get(), mixed.len().div_ceil(POINTS_PER_LOOK));
+        assert_eq!(looks.get(), mixed.len().div_ceil(POINTS_PER_STOP_CHECK));
     }
 }

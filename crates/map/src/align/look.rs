@@ -11,8 +11,8 @@ use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 use crate::visibility::Sight;
 
-/// How many times the deviation of as many single points the difference between two poses has that are equal in truth: points beside
-/// each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays.
+/// How many times the deviation of as many single points the difference between two poses has that are equal in truth:
+/// points beside each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays.
 const CLUSTERING: f64 = 1.6;
 
 /// What each point says of a scan at a pose: those of the scan, and those that the witnesses met.
@@ -47,9 +47,9 @@ impl Look {
         RayAgreement { of_scan: RayCounts::of(self.of_scan.iter().copied()), of_map: RayCounts::of(in_view) }
     }
 
-    /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of the difference
-    /// between two poses that are equal in truth: z = (a - b) / sqrt(a + b) / [`CLUSTERING`], of the points that contradict here
-    /// alone (a) and there alone (b).
+    /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of the
+    /// difference between two poses that are equal in truth: z = (a - b) / sqrt(a + b) / [`CLUSTERING`], of the points
+    /// that contradict here alone (a) and there alone (b).
     pub(super) fn contradicted_more_than(&self, other: &Self) -> f64 {
         let pairs = self.of_scan.iter().zip(&other.of_scan).chain(self.of_map.iter().zip(&other.of_map));
         let (here, there) = pairs.fold((0.0, 0.0), |(here, there), (a, b)| {
@@ -167,7 +167,8 @@ mod tests {
 
     #[test]
     fn poses_that_are_equal_in_truth_differ_by_the_deviation_that_is_counted_with() {
-        // With people they differ by up to two of it, most where one viewpoint is asked: then all that contradicts is a few people.
+        // With people they differ by up to two of it, most where one viewpoint is asked: then all that contradicts is a
+        // few people.
         for witnesses in [1, 4] {
             let [alone, one, crowd] = [0, 1, 3].map(|people| deviation_of_equals(people, witnesses));
             let is_counted = alone < 0.5 && (0.2..2.0).contains(&one) && (one..2.3).contains(&crowd);
@@ -175,8 +176,8 @@ mod tests {
         }
     }
 
-    /// The root mean square of z between two poses in a room that looks the same from both, but for people, who stand elsewhere in each
-    /// of the scans. Noise of 2 cm.
+    /// The root mean square of z between two poses in a room that looks the same from both, but for people, who stand
+    /// elsewhere in each of the scans. Noise of 2 cm.
     fn deviation_of_equals(people: usize, witnesses: usize) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut of_people = |people: usize, x: f32, y: f32| {

@@ -1,7 +1,7 @@
 //! Marched viewpoints: what earlier scans must have seen, generated from where they were taken (paper III-B).
 //!
-//! Maps from before viewpoints were kept, and those that keep none, have the poses of their scans. Rays that are cast from there through
-//! the map end where those of the scans did, if the map is dense.
+//! Maps from before viewpoints were kept, and those that keep none, have the poses of their scans. Rays that are cast
+//! from there through the map end where those of the scans did, if the map is dense.
 
 use std::f32::consts::FRAC_PI_4;
 use std::sync::Arc;
@@ -15,7 +15,8 @@ use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep, Viewpoint};
 
 /// Scans that are asked for what they saw, at most.
 const ORIGINS: usize = 4;
-/// A scan leaves a viewpoint unless there is one within half a meter: a scan that is so much nearer than all viewpoints left none, meters.
+/// A scan leaves a viewpoint unless there is one within half a meter: a scan that is so much nearer than all viewpoints
+/// left none, meters.
 const NEARER_M: f64 = 2.0;
 /// Two scans nearer to each other than this, in voxels, saw the same.
 const APART_VOXELS: f64 = 4.0;
@@ -30,8 +31,9 @@ const BEGINS_VOXELS: f32 = 2.0;
 /// Rays end here, meters.
 const RANGE_MAX_M: f64 = 60.0;
 
-/// What the scans nearest to `pose` (map frame) must have seen where they left no viewpoints: where the nearest one lies `nearest_m`
-/// from there, much farther than they do. What is to be seen from the pose itself, where neither scan nor viewpoint is known.
+/// What the scans nearest to `pose` (map frame) must have seen where they left no viewpoints: where the nearest one
+/// lies `nearest_m` from there, much farther than they do. What is to be seen from the pose itself, where neither scan
+/// nor viewpoint is known.
 pub(super) fn viewpoints_near(
     map: &MultiResolutionMap,
     pose: &Pose,

@@ -21,9 +21,9 @@
 //! ```
 //!
 //! *Overlap* is the share of all the scan's points that fall in occupied voxels of level 0 by the exact set, before the
-//! scan is added ([`overlap`](fn@overlap)). [`Verdict`] says whether to believe the pose. It is *undetermined* where the
-//! scan would fit as well at poses nearby: what it sees of the map, such as one blank wall, leaves a direction of the
-//! pose open ([`PoseInformation`]).
+//! scan is added ([`overlap`](fn@overlap)). [`Verdict`] says whether to believe the pose. It is *undetermined* where
+//! the scan would fit as well at poses nearby: what it sees of the map, such as one blank wall, leaves a direction of
+//! the pose open ([`PoseInformation`]).
 
 mod agreement;
 mod ascent;

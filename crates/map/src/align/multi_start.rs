@@ -21,8 +21,8 @@ const TURNS_DEG: [f64; 4] = [-40.0, -20.0, 20.0, 40.0];
 /// Number of the best ascents that are refined.
 const FINISHED: usize = 2;
 
-/// Ascends from the most promising of many guesses around the prior's, and returns where they ended, with the number of look-ups that
-/// were made to choose them.
+/// Ascends from the most promising of many guesses around the prior's, and returns where they ended, with the number of
+/// look-ups that were made to choose them.
 pub(super) fn ends(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,

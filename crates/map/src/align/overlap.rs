@@ -36,7 +36,7 @@ impl OccupiedVoxels for MultiResolutionMap {
 }
 
 /// Look-ups between two checks of the stop signal: a few milliseconds where every one misses all caches.
-pub(super) const LOOKUPS_PER_LOOK: usize = 1 << 18;
+pub(super) const LOOKUPS_PER_STOP_CHECK: usize = 1 << 18;
 
 /// The objective function of the ascent: the overlap of some points with one level of a map, as a function of their
 /// pose.
@@ -63,9 +63,9 @@ impl<'a> Overlap<'a> {
     /// are too small.
     pub(super) fn at(&self, poses: &[Pose], stop: StopSignal<'_>) -> Vec<usize> {
         let mut heights = vec![0; poses.len()];
-        let poses_per_look = (LOOKUPS_PER_LOOK / self.points.len().max(1)).max(1);
+        let poses_per_look = (LOOKUPS_PER_STOP_CHECK / self.points.len().max(1)).max(1);
         'scan: for (poses, heights) in poses.chunks(poses_per_look).zip(heights.chunks_mut(poses_per_look)) {
-            for points in self.points.chunks(LOOKUPS_PER_LOOK) {
+            for points in self.points.chunks(LOOKUPS_PER_STOP_CHECK) {
                 if stop.is_stopped() {
                     break 'scan;
                 }

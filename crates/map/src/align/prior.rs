@@ -6,8 +6,8 @@ use super::gravity::Gravity;
 use super::settings::AlignmentSettings;
 use crate::geometry::Pose;
 
-/// What is known of a scan's pose beforehand: where it is thought to have been taken, how far off that may be, and which
-/// way is down.
+/// What is known of a scan's pose beforehand: where it is thought to have been taken, how far off that may be, and
+/// which way is down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosePrior {
     /// Where the scan is thought to have been taken: map_from_sensor.
@@ -17,8 +17,8 @@ pub struct PosePrior {
     /// How far off it is expected to be where no covariance says so: it speaks for poses near the guess, and rules none
     /// out.
     pub expected: Option<PoseCovariance>,
-    /// The robot may have turned unseen, so that the guess tells nothing of which way it looks, where no covariance does: as after a
-    /// time that nobody knows, since its last pose.
+    /// The robot may have turned unseen, so that the guess tells nothing of which way it looks, where no covariance
+    /// does: as after a time that nobody knows, since its last pose.
     pub may_have_turned: bool,
     /// Direction of gravity, as an accelerometer tells.
     pub gravity: Option<Gravity>,
@@ -27,8 +27,8 @@ pub struct PosePrior {
 /// Covariance of a pose, as ROS has it in `PoseWithCovariance`: x y z (meters, along the map's axes), then turns about
 /// these axes through the sensor (radians).
 ///
-/// A guess is not nearer to the truth than it is to be found: to each variance comes that of a voxel or a degree, so that
-/// a robot on a plane may say zero of its height.
+/// A guess is not nearer to the truth than it is to be found: to each variance comes that of a voxel or a degree, so
+/// that a robot on a plane may say zero of its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseCovariance(Matrix6<f64>);
 
@@ -81,8 +81,8 @@ impl PoseCovariance {
         Ok(Self(matrix))
     }
 
-    /// That of a pose which may be off by these standard deviations in every direction and about every axis, at most by those of a
-    /// pose of which nothing is known.
+    /// That of a pose which may be off by these standard deviations in every direction and about every axis, at most by
+    /// those of a pose of which nothing is known.
     pub fn isotropic(std_m: f64, std_rad: f64) -> Self {
         let (meters, radians) =
             (std_m.clamp(0.0, WIDE_M).powi(2), std_rad.clamp(0.0, WIDE_DEG.to_radians()).powi(2));
@@ -107,8 +107,8 @@ impl PoseCovariance {
         std::array::from_fn(|k| self.0[(k / 6, k % 6)])
     }
 
-    /// How many standard deviations `pose` is from `guess` (map_from_sensor), where a pose is found to within `found_m` and
-    /// `found_rad` anyway.
+    /// How many standard deviations `pose` is from `guess` (map_from_sensor), where a pose is found to within `found_m`
+    /// and `found_rad` anyway.
     fn deviations(&self, guess: &Pose, pose: &Pose, found_m: f64, found_rad: f64) -> f64 {
         let shift = pose.translation.vector - guess.translation.vector;
         let turn = (pose.rotation * guess.rotation.inverse()).scaled_axis();
@@ -158,8 +158,8 @@ impl PosePrior {
         self.covariance.or(self.expected).unwrap_or_else(PoseCovariance::wide)
     }
 
-    /// How many standard deviations of what is known beforehand `pose` (map_from_sensor) is from the guess. Voxels of the finest level
-    /// have sides of `resolution_m`.
+    /// How many standard deviations of what is known beforehand `pose` (map_from_sensor) is from the guess. Voxels of
+    /// the finest level have sides of `resolution_m`.
     pub(super) fn deviations(&self, pose: &Pose, resolution_m: f64) -> f64 {
         let covariance = self.spread();
         covariance.deviations(&self.leveled_guess(), pose, resolution_m, FOUND_DEG.to_radians())
@@ -185,8 +185,8 @@ impl PosePrior {
         Self { covariance: None, expected: Some(covariance.with_open_yaw()), ..self }
     }
 
-    /// True of a pose (map_from_sensor) that contradicts what is known of it beforehand. Voxels of the finest level have
-    /// sides of `resolution_m`.
+    /// True of a pose (map_from_sensor) that contradicts what is known of it beforehand. Voxels of the finest level
+    /// have sides of `resolution_m`.
     pub fn rules_out(&self, pose: &Pose, resolution_m: f64, settings: &AlignmentSettings) -> bool {
         self.against(pose, resolution_m, settings).is_some()
     }

@@ -1,14 +1,15 @@
 //! Rivals: which of several poses a scan was taken at, by what is known beforehand and by rays.
 //!
-//! No least agreement tells a right pose from a wrong one: a robot that turned in a rectangular room has nearly as much as at the true
-//! pose. But the true pose is contradicted less. So the poses where ascents ended are compared, with the same witnesses, by one cost:
-//! the squared deviation from what is known beforehand, and that by which rays contradict a pose more than the one they like best.
+//! No least agreement tells a right pose from a wrong one: a robot that turned in a rectangular room has nearly as much
+//! as at the true pose. But the true pose is contradicted less. So the poses where ascents ended are compared, with the
+//! same witnesses, by one cost: the squared deviation from what is known beforehand, and that by which rays contradict
+//! a pose more than the one they like best.
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
-use super::ends::{End, Ends, RIVAL};
+use super::ends::{End, Ends, RIVAL, cost_of_prior};
 use super::fit::Fit;
 use super::prior::PosePrior;
 use super::sampled_scan::SampledScan;
@@ -44,12 +45,13 @@ impl Contest<'_> {
             return self.judged(&ends);
         }
         // Whoever was turned away unseen may stand at any yaw, and where things repeat the scan fits at each of them.
-        let may_have_turned = is_doubted || prior.leaves_yaw_open();
+        let may_have_turned = is_doubted || prior.leaves_yaw_open() || best.is_beyond_odometry();
         let others = self.others(&best.fit, prior, is_doubted, may_have_turned);
         if others.is_empty() || self.settings.multi_start.ascents == 0 {
             return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&ends) };
         }
-        if may_have_turned {
+        // What odometry tells of the turn is heard where rays contradict both sides, too.
+        if prior.leaves_yaw_open() {
             ends.open_yaw();
         }
         for (guess, coarsest) in others {
@@ -77,9 +79,9 @@ impl Contest<'_> {
         Ends::of(found, self.map, self.rays, prior, self.settings, self.scan.stop)
     }
 
-    /// Where else the scan may fit as well, with the coarsest level to ascend on from there: shifted as far as the prior reaches around
-    /// its guess, along the map's axes and those of what holds the pose, and turned. Where the pose is doubted, on other floors too: the
-    /// robot may have taken a lift.
+    /// Where else the scan may fit as well, with the coarsest level to ascend on from there: shifted as far as the
+    /// prior reaches around its guess, along the map's axes and those of what holds the pose, and turned. Where the
+    /// pose is doubted, on other floors too: the robot may have taken a lift.
     fn others(
         &self,
         found: &Fit,
@@ -100,7 +102,7 @@ impl Contest<'_> {
         let pose = &found.map_from_sensor;
         let shifted = shifted(self.map, self.scan, pose, &axes, possible_m, self.settings);
         let turned = match may_have_turned {
-            true => turned(self.map, self.scan, pose, self.settings),
+            true => turned(self.map, self.scan, pose, &prior.guess, self.settings),
             false => Vec::new(),
         };
         let coarsest = self.map.settings().levels - 1;
@@ -108,8 +110,8 @@ impl Contest<'_> {
         shifted.chain(turned.into_iter().map(|guess| (guess, LEVEL_OF_TURNS.min(coarsest)))).collect()
     }
 
-    /// True of an end that rays contradict both ways, by more than the witnesses contradict each other: people, and what was brought
-    /// or taken away, contradict one side only.
+    /// True of an end that rays contradict both ways, by more than the witnesses contradict each other: people, and
+    /// what was brought or taken away, contradict one side only.
     fn is_doubted(&self, end: &End, ends: &Ends<'_>) -> bool {
         let is_contradicted = matches!(end.against, Some((Verdict::Contradicted, _)));
         is_contradicted || end.against.is_none() && !ends.is_usual(end)
@@ -158,8 +160,8 @@ impl Contest<'_> {
         (Verdict::Accepted, reason, Vec::new())
     }
 
-    /// Where rays contradict the scan hardly more than at `end`, a little aside or turned, as far as the prior allows: they do not hold
-    /// it.
+    /// Where rays contradict the scan hardly more than at `end`, a little aside or turned, as far as the prior allows:
+    /// they do not hold it.
     fn slides_to(&self, end: &End, ends: &Ends<'_>) -> Option<String> {
         let pose = &end.fit.map_from_sensor;
         let aside_m = ASIDE_VOXELS * self.map.lattice().resolution_m(0);
@@ -172,7 +174,7 @@ impl Contest<'_> {
             let shift = Translation3::new(shift.x, shift.y, 0.0);
             let aside = Pose::from_parts(shift * pose.translation, turn * pose.rotation);
             // Most are ruled out by what is known beforehand, without a look.
-            let farther = ends.deviations(&aside).powi(2) - end.deviations.powi(2);
+            let farther = cost_of_prior(ends.deviations(&aside)) - cost_of_prior(end.deviations);
             farther <= RIVAL && contrast(&end.agreement, &ends.agreement_at(&aside)) < CONTRAST_MIN
         };
         let (shift, degrees) = shifts.into_iter().chain(turns).find(is_open)?;
@@ -190,8 +192,8 @@ fn least_held(found: &Fit) -> Option<Vector2<f64>> {
     on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())
 }
 
-/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one side wherever the
-/// scan is put. One point more or less is chance.
+/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one
+/// side wherever the scan is put. One point more or less is chance.
 fn contrast(here: &RayAgreement, there: &RayAgreement) -> f64 {
     let of =
         |here: RayCounts, there: RayCounts| (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64;

@@ -18,7 +18,8 @@ pub(super) struct SampledScan<'a> {
     pub(super) sample: Vec<Point>,
     /// Volumetric sample of about 5000 points, for the refinement and the verdict.
     pub(super) surface_sample: Vec<Point>,
-    /// The surfaces of the map near the scan, as far as they were asked for: all ends of the alignment lie on the same ones.
+    /// The surfaces of the map near the scan, as far as they were asked for: all ends of the alignment lie on the same
+    /// ones.
     pub(super) surfaces: RefCell<VoxelGaussians>,
     /// Ends the alignment early; every climb checks it.
     pub(super) stop: StopSignal<'a>,

@@ -44,7 +44,8 @@ pub fn align_until(
     let guess = prior.leveled_guess();
     let prior = &PosePrior { guess, ..*prior };
 
-    // 1) - 5) from the guess. The coarse levels find what is far from it, and pull away from what is near: both ends are looked at.
+    // 1) - 5) from the guess. The coarse levels find what is far from it, and pull away from what is near: both ends
+    //    are looked at.
     let coarsest = map.settings().levels - 1;
     let from_coarse = climb(map, scan, guess, coarsest, settings);
     let mut ends = vec![finish(map, scan, from_coarse, settings)];

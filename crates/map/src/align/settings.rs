@@ -53,23 +53,23 @@ pub struct AlignmentSettings {
     pub refinement: RefinementSettings,
     /// What to try where the ascent from the guess ends badly.
     pub multi_start: MultiStartSettings,
-    /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say. 0: how much that is
-    /// depends on how densely the map is filled.
+    /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say. 0:
+    /// how much that is depends on how densely the map is filled.
     pub overlap_min: f64,
     /// A pose is undetermined where its standard deviation in some direction exceeds this fraction of r_0. 0.2: ten
     /// times that of a furnished room, a seventh of that along a blank wall.
     pub undetermined_std: f64,
-    /// Where a map keeps no moments, a scan is shifted by this many r_0 in all directions to see what holds it. 5: more than
-    /// walls are thick.
+    /// Where a map keeps no moments, a scan is shifted by this many r_0 in all directions to see what holds it. 5: more
+    /// than walls are thick.
     pub slide: f64,
-    /// A pose is undetermined where more than this fraction of the overlap is left after such a shift. 0.85: along a blank
-    /// wall or a corridor 0.92 and more are left, in a furnished room at most 0.7.
+    /// A pose is undetermined where more than this fraction of the overlap is left after such a shift. 0.85: along a
+    /// blank wall or a corridor 0.92 and more are left, in a furnished room at most 0.7.
     pub slide_overlap_max: f64,
     /// Largest angle between the direction of gravity that a scan tells and down in the map, degrees. 5: what an
     /// accelerometer says of a robot that brakes at 1 m/s2 is 6 off, at half of that 3.
     pub gravity_error_max_deg: f64,
-    /// How many standard deviations of its covariance a pose may be from the guess. 4.7: of guesses as good as they say,
-    /// one in a thousand is farther off (chi-squared with six degrees of freedom).
+    /// How many standard deviations of its covariance a pose may be from the guess. 4.7: of guesses as good as they
+    /// say, one in a thousand is farther off (chi-squared with six degrees of freedom).
     pub covariance_deviations_max: f64,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").

@@ -1,8 +1,8 @@
 //! How well a scan fits a few voxels aside, by overlap alone.
 //!
-//! A map that keeps no moments does not know its surfaces. The centers of its voxels make stairs of a wall that lies askew
-//! in the lattice, and stairs seem to hold a scan along the wall. Overlap is not misled: where a scan fits about as well
-//! some voxels aside, nothing holds it in that direction.
+//! A map that keeps no moments does not know its surfaces. The centers of its voxels make stairs of a wall that lies
+//! askew in the lattice, and stairs seem to hold a scan along the wall. Overlap is not misled: where a scan fits about
+//! as well some voxels aside, nothing holds it in that direction.
 
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -31,7 +31,8 @@ pub(super) struct Slide {
 }
 
 impl Slide {
-    /// Of all shifts of a scan at `pose` by [`AlignmentSettings::slide`]; none of a scan without overlap, or once stopped.
+    /// Of all shifts of a scan at `pose` by [`AlignmentSettings::slide`]; none of a scan without overlap, or once
+    /// stopped.
     pub(super) fn of(
         map: &MultiResolutionMap,
         scan: &SampledScan<'_>,

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use overlap::LOOKUPS_PER_LOOK;
+use overlap::LOOKUPS_PER_STOP_CHECK;
 
 use super::*;
 use crate::geometry::{Point, Pose};
@@ -41,7 +41,7 @@ fn an_alignment_looks_at_the_signal_in_proportion_to_its_work() {
             let stop = StopSignal::when(&count_look);
             let found = align_until(&map, &points, &guess.into(), &settings(method), stop);
             let work = (found.lookups + 16 * points.len() as u64) / looks.get();
-            assert!(work <= LOOKUPS_PER_LOOK as u64, "{method:?}, {count} points: {work} a look");
+            assert!(work <= LOOKUPS_PER_STOP_CHECK as u64, "{method:?}, {count} points: {work} a look");
         }
     }
 }
@@ -56,7 +56,7 @@ fn judging_a_pose_looks_at_the_signal_in_proportion_to_its_work() {
         evaluate_at(&map, &points, &Pose::identity(), &settings(Method::Overlap), stop);
         let levels = u64::from(map.settings().levels);
         let work = levels * points.len() as u64 / looks.get();
-        assert!(work <= LOOKUPS_PER_LOOK as u64, "{count} points: {work} look-ups a look");
+        assert!(work <= LOOKUPS_PER_STOP_CHECK as u64, "{count} points: {work} look-ups a look");
     }
 }
 

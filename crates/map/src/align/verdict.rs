@@ -17,11 +17,11 @@ pub enum Verdict {
     /// The scan fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves
     /// a direction open, or rays agree as well a little aside.
     Undetermined,
-    /// The scan may have been taken at other poses as well ([`Alignment::rivals`]), or the pose lies farther from the guess than
-    /// other poses were looked for.
+    /// The scan may have been taken at other poses as well ([`Alignment::rivals`]), or the pose lies farther from the
+    /// guess than other poses were looked for.
     Ambiguous,
-    /// The scan fits, but earlier scans saw through its points and it saw through what they met, or the pose is not where
-    /// gravity or the covariance of the guess allow.
+    /// The scan fits, but earlier scans saw through its points and it saw through what they met, or the pose is not
+    /// where gravity or the covariance of the guess allow.
     Contradicted,
 }
 
@@ -65,10 +65,11 @@ pub struct Alignment {
     pub agreement: Option<RayAgreement>,
     /// Poses that the scan may have been taken at as well: why it is [ambiguous](Verdict::Ambiguous).
     pub rivals: Vec<Rival>,
-    /// Rays contradict the pose both ways, more than earlier scans contradict each other, and no other pose is better: things were
-    /// moved since, and the scan carves nothing.
+    /// Rays contradict the pose both ways, more than earlier scans contradict each other, and no other pose is better:
+    /// things were moved since, and the scan carves nothing.
     pub contradicted_both_ways: bool,
-    /// Other poses should have been looked for, and were not: [`MultiStartSettings::ascents`](super::MultiStartSettings) is 0.
+    /// Other poses should have been looked for, and were not:
+    /// [`MultiStartSettings::ascents`](super::MultiStartSettings) is 0.
     pub wants_more_starts: bool,
     /// Number of steps that moved the pose, over all stages.
     pub iterations: u32,
@@ -83,8 +84,8 @@ impl Alignment {
         self.level_overlaps.first().copied().unwrap_or(0.0)
     }
 
-    /// True of a pose that the caller tells, or that rays do not contradict both ways: what a scan saw through from there is
-    /// believed.
+    /// True of a pose that the caller tells, or that rays do not contradict both ways: what a scan saw through from
+    /// there is believed.
     pub fn is_beyond_doubt(&self) -> bool {
         !self.contradicted_both_ways
     }

@@ -42,8 +42,8 @@ pub(super) struct MetInMap {
 }
 
 impl Witnesses {
-    /// The witnesses of a scan that was taken at one of some poses: for each, of the viewpoints near to it those that saw most of
-    /// what the scan shows there.
+    /// The witnesses of a scan that was taken at one of some poses: for each, of the viewpoints near to it those that
+    /// saw most of what the scan shows there.
     pub(super) fn of(rays: &Rays, map: &MultiResolutionMap, poses: &[Pose], stop: StopSignal<'_>) -> Self {
         let mut witnesses = Self { viewpoints: Vec::new(), met: Vec::new() };
         witnesses.add(rays, map, poses, stop);
@@ -69,8 +69,8 @@ impl Witnesses {
         self.met = met(map, &self.viewpoints, rays.tolerance_m);
     }
 
-    /// The share of what each witness met that another one contradicts, of what it says anything of: what moved, and what images are
-    /// too coarse for.
+    /// The share of what each witness met that another one contradicts, of what it says anything of: what moved, and
+    /// what images are too coarse for.
     pub(super) fn contradicted_among_each_other(&self, tolerance_m: f32) -> f64 {
         let viewpoints = &self.viewpoints;
         let sights = viewpoints.iter().flat_map(|viewpoint| {

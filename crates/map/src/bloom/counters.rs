@@ -20,7 +20,7 @@ pub(crate) type CountersOfWord = [AtomicU64; COUNTER_BITS as usize];
 /// that wrap, as in the original code, do.)
 ///
 /// Look-ups read the plane alone. So a map counts while they go on, through a shared reference, and keeps them
-/// waiting for the plane's bits only; who counts is one thread at a time, and needs no atomic addition.
+/// waiting for the plane's bits only; one thread counts at a time, and needs no atomic addition.
 #[derive(Debug)]
 pub(super) struct Counters(Vec<CountersOfWord>);
 

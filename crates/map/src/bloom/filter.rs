@@ -12,8 +12,8 @@ use super::rates::{FilterSettings, expected_rate, ideal_false_positive_rate};
 /// counters  [ 4 words of 16 x 4 bits ]...        cold: how many keys set each bit, for removal
 /// ```
 ///
-/// A bit is set where its counter is not zero. A change has two steps, so that who shares the filter with readers
-/// takes the first one beside them: *counting*, and then setting or clearing the plane's bits.
+/// A bit is set where its counter is not zero. A change has two steps, so that a writer that shares the filter with
+/// readers takes the first one beside them: *counting*, and then setting or clearing the plane's bits.
 #[derive(Debug)]
 pub struct CountingBloomFilter {
     plane: Vec<u64>,

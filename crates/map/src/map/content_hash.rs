@@ -8,8 +8,8 @@ use crate::voxel::{BlockMask, VoxelSet};
 
 /// Hash of a set of finest voxels: equal for equal sets, whatever order their voxels came in.
 ///
-/// It is the sum, modulo 2^64, of the mixed keys of the voxels, so that a change costs what it adds and takes out, and a
-/// copy of a map compares itself with its original for nothing. A key is mixed by the output function of SplitMix64
+/// It is the sum, modulo 2^64, of the mixed keys of the voxels, so that a change costs what it adds and takes out, and
+/// a copy of a map compares itself with its original for nothing. A key is mixed by the output function of SplitMix64
 /// (Steele, Lea, Flood, *Fast splittable pseudorandom number generators*, OOPSLA 2014), all sums and products modulo
 /// 2^64:
 ///

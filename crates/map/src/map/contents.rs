@@ -129,8 +129,8 @@ impl MultiResolutionMap {
     fn taken_until(&self, stop: StopSignal<'_>) -> MapContents {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
-        // Every change of the trajectory or the requests holds a shard meanwhile, or the keep-outs, so that all of them are
-        // of one revision.
+        // Every change of the trajectory or the requests holds a shard meanwhile, or the keep-outs, so that all of them
+        // are of one revision.
         let locked = self.keep_outs.read();
         let (revision, keep_outs) = (self.revision(), Arc::clone(&locked));
         let (viewpoints, trajectory, requests) =

@@ -93,8 +93,8 @@ impl MultiResolutionMap {
         }
     }
 
-    /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory, and of what is derived of
-    /// the voxels beside the map.
+    /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory, and of what is derived
+    /// of the voxels beside the map.
     pub fn memory_bytes(&self) -> usize {
         let (moments, view) = (self.moments(), self.view());
         view.shards().map(Shard::set_bytes).sum::<usize>()

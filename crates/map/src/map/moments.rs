@@ -8,12 +8,12 @@ use crate::util::StopSignal;
 use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};
 
 /// Voxels whose moments are copied or added between two looks at the stop signal: a millisecond or so.
-const VOXELS_PER_LOOK: usize = 16 << 10;
+const VOXELS_PER_STOP_CHECK: usize = 16 << 10;
 
 /// The moments of the points in each voxel of [`MOMENT_LEVEL`], in shards like the voxels themselves.
 ///
 /// They have locks of their own, since look-ups, which are many, never ask for them, and a table that grows here may
-/// take a while. Who takes both kinds of locks takes these first.
+/// take a while. Where both kinds of locks are taken, these are taken first.
 #[derive(Debug)]
 pub(super) struct ShardedMoments {
     sharding: Sharding,
@@ -31,7 +31,7 @@ pub struct MomentsView<'a> {
     shards: [RwLockReadGuard<'a, MomentShard>; SHARDS],
 }
 
-/// Keeps who refines waiting until a change is published.
+/// Keeps refinements waiting until a change is published.
 pub(super) type MomentLocks<'a> = Vec<RwLockWriteGuard<'a, MomentShard>>;
 
 /// Moments of voxels of one shard.
@@ -85,8 +85,8 @@ impl ShardedMoments {
         MomentsView { sharding: self.sharding, shards }
     }
 
-    /// Changes shards, in ascending order: what voxels `lost` is taken out, moments are `added`, and last those that are
-    /// `known` take the place of what is there. Shards without any of this are passed over; some of it is done once
+    /// Changes shards, in ascending order: what voxels `lost` is taken out, moments are `added`, and last those that
+    /// are `known` take the place of what is there. Shards without any of this are passed over; some of it is done once
     /// stopped.
     pub(super) fn change<'l>(
         &self,
@@ -122,7 +122,7 @@ impl ShardedMoments {
 impl MomentShard {
     /// Adds the moments of points whose voxels are, or are about to be, occupied; some of them once stopped.
     fn add(&mut self, moments: &[(VoxelKey, Moments)], stop: StopSignal<'_>) {
-        for &(voxel, added) in stop.pieces(moments, VOXELS_PER_LOOK).flatten() {
+        for &(voxel, added) in stop.pieces(moments, VOXELS_PER_STOP_CHECK).flatten() {
             *self.0.entry(voxel).or_default() += added;
         }
     }
@@ -172,7 +172,7 @@ impl MomentsView<'_> {
     /// All moments; once stopped, some of them.
     pub(super) fn to_set_until(&self, stop: StopSignal<'_>) -> MomentSet {
         let mut all = Vec::with_capacity(self.shards.iter().map(|shard| shard.0.len()).sum());
-        let entries = stop.paced(self.shards.iter().flat_map(|shard| &shard.0), VOXELS_PER_LOOK);
+        let entries = stop.paced(self.shards.iter().flat_map(|shard| &shard.0), VOXELS_PER_STOP_CHECK);
         all.extend(entries.map(|(&voxel, &moments)| (voxel, moments)));
         MomentSet::of_voxels_until(all, stop)
     }

@@ -35,7 +35,7 @@ pub struct MultiResolutionMap {
     pub(super) published: Published,
     pub(super) followers: Followers,
     pub(super) commit_queue: Mutex<()>,
-    /// Held by who reads for long; see [`MultiResolutionMap::long_read`].
+    /// Held by long reads; see [`MultiResolutionMap::long_read`].
     pub(super) long_reads: RwLock<()>,
 }
 
@@ -93,14 +93,14 @@ impl MultiResolutionMap {
         self.shards.iter().all(|shard| shard.read().is_empty())
     }
 
-    /// The poses of the accepted scans, as they are now. Nobody waits for who holds them.
+    /// The poses of the accepted scans, as they are now. Nothing waits for their holders.
     pub fn trajectory(&self) -> Trajectory {
         self.trajectory.read().clone()
     }
 
     /// The poses of the accepted scans, with a version of the map at which they are these.
     pub fn trajectory_and_version(&self) -> (Trajectory, ContentVersion) {
-        // Who adds a pose publishes its revision before others may read.
+        // A pose is added and its revision published before others may read.
         let trajectory = self.trajectory.read();
         (trajectory.clone(), self.content_version())
     }
@@ -122,7 +122,7 @@ impl MultiResolutionMap {
 
     /// The keep-outs, with a version of the map at which they are these.
     pub fn keep_outs_and_version(&self) -> (Arc<KeepOuts>, ContentVersion) {
-        // Who changes them publishes the revision before others may read.
+        // They are changed and the revision published before others may read.
         let keep_outs = self.keep_outs.read();
         (Arc::clone(&keep_outs), self.content_version())
     }
@@ -143,8 +143,8 @@ impl MultiResolutionMap {
         self.moments.as_ref().map(ShardedMoments::view)
     }
 
-    /// The moments of the centers of the finest voxels in a voxel of [`MOMENT_LEVEL`], which stand for points that are not
-    /// known; none where there is no voxel. Locks one shard.
+    /// The moments of the centers of the finest voxels in a voxel of [`MOMENT_LEVEL`], which stand for points that are
+    /// not known; none where there is no voxel. Locks one shard.
     pub(crate) fn center_moments(&self, voxel: VoxelKey) -> Option<Moments> {
         let (block, cell) = Cell::of(voxel.index().map(|i| i << MOMENT_LEVEL));
         let shard = self.shards[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].read();
@@ -152,7 +152,8 @@ impl MultiResolutionMap {
         (word != 0).then(|| Moments::of_descendants(word))
     }
 
-    /// Follows which blocks change from now on, for what is derived of the voxels. Changes cost a little more meanwhile.
+    /// Follows which blocks change from now on, for what is derived of the voxels. Changes cost a little more
+    /// meanwhile.
     pub fn follow_blocks(&self) -> BlockFollower {
         self.followers.add()
     }

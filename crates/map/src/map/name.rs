@@ -136,7 +136,7 @@ impl RequestId {
     }
 }
 
-/// The name of the key of who asks for changes: 1 to 64 of `[A-Za-z0-9_.-]`.
+/// The name of the key that asks for changes: 1 to 64 of `[A-Za-z0-9_.-]`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CallerName(Arc<str>);
 

@@ -1,9 +1,10 @@
 //! Where a map's frame lies in the frame that its scans were surveyed in.
 
-/// Where a map's frame lies in another, larger one: that of a survey, of which voxels and points of f32 cannot hold the coordinates.
+/// Where a map's frame lies in another, larger one: that of a survey, of which voxels and points of f32 cannot hold the
+/// coordinates.
 ///
-/// A place `p` of the map is at `p + position_m` there. The map itself never uses it: it is kept for those who read the map, and
-/// for scans in the coordinates of the survey.
+/// A place `p` of the map is at `p + position_m` there. The map itself never uses it: it is kept for those who read the
+/// map, and for scans in the coordinates of the survey.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapOrigin {
     /// The map's origin in the frame of the survey, meters.

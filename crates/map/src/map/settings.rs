@@ -20,8 +20,8 @@ pub struct MapSettings {
     pub origin: Option<MapOrigin>,
 }
 
-/// Levels of a map where its maker does not say: voxels up to 32 r_0, so that an alignment finds its way from 1 m and 20
-/// degrees off at r_0 = 0.04 m. (The paper takes 4 and steps of a few centimeters, III-B.)
+/// Levels of a map where its maker does not say: voxels up to 32 r_0, so that an alignment finds its way from 1 m and
+/// 20 degrees off at r_0 = 0.04 m. (The paper takes 4 and steps of a few centimeters, III-B.)
 pub const LEVELS_DEFAULT: u32 = 6;
 
 /// Why settings cannot make a map.

@@ -39,8 +39,8 @@ impl fmt::Display for StateHash {
 }
 
 impl MultiResolutionMap {
-    /// The hash of all that a copy of the map may hold now. To be called by who makes its changes: what it reads is of
-    /// one revision only while nobody makes another.
+    /// The hash of all that a copy of the map may hold now. To be called by the maker of its changes: what it reads is
+    /// of one revision only while nobody makes another.
     pub fn state_hash(&self) -> StateHash {
         StateHash::of(self.content_version().hash, self.keep_outs().hash(), self.viewpoints().hash())
     }

@@ -13,7 +13,7 @@ use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
 use crate::visibility::ViewpointSet;
 use crate::voxel::{
-    BLOCK_LEVELS, BLOCKS_PER_LOOK, BlockMask, Cell, Lattice, LatticeFromPoints, VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCKS_PER_STOP_CHECK, BlockMask, Cell, Lattice, LatticeFromPoints, VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -45,8 +45,8 @@ impl<'a> LongRead<'a> {
         self.map.view()
     }
 
-    /// Locks the moments of the map's points for reading; before a view, where both are needed. None of a map that keeps
-    /// no moments.
+    /// Locks the moments of the map's points for reading; before a view, where both are needed. None of a map that
+    /// keeps no moments.
     pub fn moments(&self) -> Option<MomentsView<'_>> {
         self.map.moments()
     }
@@ -74,8 +74,8 @@ impl<'a> MapView<'a> {
         Some(Self { map, shards, version: map.content_version(), keep_outs: None, viewpoints: None })
     }
 
-    /// This view with the keep-outs of the map, all at one revision, which may be a later one: what the view covers has not
-    /// changed since.
+    /// This view with the keep-outs of the map, all at one revision, which may be a later one: what the view covers has
+    /// not changed since.
     #[must_use]
     pub fn with_keep_outs(self) -> Self {
         // Nobody publishes a change of what is locked: of the shards before, of the keep-outs now.
@@ -96,8 +96,8 @@ impl<'a> MapView<'a> {
         self.keep_outs.as_ref()
     }
 
-    /// This view with where scans saw through, all at one revision, which may be a later one: what the view covers has not
-    /// changed since.
+    /// This view with where scans saw through, all at one revision, which may be a later one: what the view covers has
+    /// not changed since.
     #[must_use]
     pub fn with_viewpoints(self) -> Self {
         // Keep-outs may have changed since they were asked for: both are taken anew, at once.
@@ -244,7 +244,7 @@ impl<'a> MapView<'a> {
     pub(super) fn voxels_until(&self, stop: StopSignal<'_>) -> VoxelSet {
         let mut all = Vec::with_capacity(self.lists(0).map(|list| list.blocks().len()).sum());
         all.extend(
-            stop.paced(self.shards.iter().flatten().flat_map(|shard| shard.blocks()), BLOCKS_PER_LOOK),
+            stop.paced(self.shards.iter().flatten().flat_map(|shard| shard.blocks()), BLOCKS_PER_STOP_CHECK),
         );
         VoxelSet::of_blocks_until(all, stop)
     }
@@ -291,7 +291,8 @@ impl MultiResolutionMap {
         LongRead { _changes_wait: self.long_reads.read(), map: self }
     }
 
-    /// [`MultiResolutionMap::long_read`] where no change has to be waited for; none elsewhere. For threads that may not wait.
+    /// [`MultiResolutionMap::long_read`] where no change has to be waited for; none elsewhere. For threads that may not
+    /// wait.
     pub fn try_long_read(&self) -> Option<LongRead<'_>> {
         Some(LongRead { _changes_wait: self.long_reads.try_read()?, map: self })
     }

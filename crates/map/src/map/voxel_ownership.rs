@@ -19,9 +19,9 @@ use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelS
 ///
 /// VoxelOwnership are made in this order: each target is [touched](VoxelOwnership::touch), so that nothing else need be
 /// remembered; the [base](VoxelOwnership::begin) and every change after it, the targets among them, are
-/// [observed](VoxelOwnership::observe); what undoing the targets does is [found out](VoxelOwnership::reversal); and what is
-/// observed after that [renews](VoxelOwnership::renew) it. They take memory by what the targets touched, whatever else
-/// the map held.
+/// [observed](VoxelOwnership::observe); what undoing the targets does is [found out](VoxelOwnership::reversal); and
+/// what is observed after that [renews](VoxelOwnership::renew) it. They take memory by what the targets touched,
+/// whatever else the map held.
 #[derive(Debug)]
 pub struct VoxelOwnership {
     /// By revision, ascending.
@@ -58,17 +58,17 @@ pub struct Reversal {
     pub removed: VoxelSet,
     /// The voxels that come back: those that the targets took away.
     pub restored: VoxelSet,
-    /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points where
-    /// nothing is left.
+    /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points
+    /// where nothing is left.
     pub moments: MomentSet,
 }
 
 /// Entries that are looked at between two looks at the stop signal.
-const ENTRIES_PER_LOOK: usize = 16 << 10;
+const ENTRIES_PER_STOP_CHECK: usize = 16 << 10;
 
 impl VoxelOwnership {
-    /// The ownership of changes that are to be undone, by revision, in a map with moments or without; those of `withdrawn`
-    /// were taken back before.
+    /// The ownership of changes that are to be undone, by revision, in a map with moments or without; those of
+    /// `withdrawn` were taken back before.
     pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnChange], keeps_moments: bool) -> Self {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.change).collect();
@@ -111,15 +111,15 @@ impl VoxelOwnership {
         }
     }
 
-    /// Begins with `base`, what the map held at a revision before that of any target. False once stopped. No change may lie
-    /// before the base and be taken back after it.
+    /// Begins with `base`, what the map held at a revision before that of any target. False once stopped. No change may
+    /// lie before the base and be taken back after it.
     pub fn begin(&mut self, base: &MapContents, stop: StopSignal<'_>) -> bool {
-        for (block, mask) in stop.pieces(base.voxels.blocks(), ENTRIES_PER_LOOK).flatten() {
+        for (block, mask) in stop.pieces(base.voxels.blocks(), ENTRIES_PER_STOP_CHECK).flatten() {
             if let Some(sides) = self.blocks.get_mut(block) {
                 *sides = Sides { with: *mask, without: *mask };
             }
         }
-        for (voxel, moments) in stop.pieces(base.moments.as_slice(), ENTRIES_PER_LOOK).flatten() {
+        for (voxel, moments) in stop.pieces(base.moments.as_slice(), ENTRIES_PER_STOP_CHECK).flatten() {
             if let Some(without) = self.moments.get_mut(voxel) {
                 *without = *moments;
             }
@@ -184,18 +184,19 @@ impl VoxelOwnership {
     /// [`VoxelOwnership::renew`].
     pub fn reversal(&mut self, stop: StopSignal<'_>) -> Option<Reversal> {
         let of_blocks = |of: fn(&Sides) -> BlockMask| {
-            let blocks = stop.paced(&self.blocks, ENTRIES_PER_LOOK);
+            let blocks = stop.paced(&self.blocks, ENTRIES_PER_STOP_CHECK);
             VoxelSet::of_blocks_until(blocks.map(|(&block, sides)| (block, of(sides))).collect(), stop)
         };
         let (removed, restored) = (of_blocks(Sides::removed), of_blocks(Sides::restored));
-        let moments = stop.paced(&self.moments, ENTRIES_PER_LOOK).map(|(&voxel, without)| (voxel, *without));
+        let moments =
+            stop.paced(&self.moments, ENTRIES_PER_STOP_CHECK).map(|(&voxel, without)| (voxel, *without));
         let moments = MomentSet::of_voxels_until(moments.collect(), stop);
         self.since = Some(Since::default());
         (!stop.is_stopped()).then_some(Reversal { removed, restored, moments })
     }
 
-    /// Makes what undoing the targets did what it does now; true where that may be something else. It takes as long as what
-    /// was observed since, and where that was something, a copy.
+    /// Makes what undoing the targets did what it does now; true where that may be something else. It takes as long as
+    /// what was observed since, and where that was something, a copy.
     pub fn renew(&self, removed: &mut VoxelSet, restored: &mut VoxelSet, moments: &mut MomentSet) -> bool {
         let Some(since) = self.since.as_ref().filter(|since| !since.is_empty()) else { return false };
         for (voxels, of) in
@@ -298,7 +299,11 @@ mod tests {
             let mut observations = begun(&[2], &[insertion(2, 0..10)], &base);
             assert!(observations.begin(&base, StopSignal::when(&count)));
             let entries = base.voxels.blocks().len() + base.moments.as_slice().len();
-            assert!(entries / looks.get() <= ENTRIES_PER_LOOK, "{entries} entries, {} looks", looks.get());
+            assert!(
+                entries / looks.get() <= ENTRIES_PER_STOP_CHECK,
+                "{entries} entries, {} looks",
+                looks.get()
+            );
             let gone = || true;
             assert!(!observations.begin(&base, StopSignal::when(&gone)));
         }
@@ -357,7 +362,10 @@ mod tests {
         let count = || looks.replace(looks.get() + 1) == usize::MAX;
         assert!(observations.reversal(StopSignal::when(&count)).is_some());
         let entries = observations.blocks.len() + observations.moments.len();
-        assert!(looks.get() >= entries / ENTRIES_PER_LOOK && entries > 10 * ENTRIES_PER_LOOK, "{entries}");
+        assert!(
+            looks.get() >= entries / ENTRIES_PER_STOP_CHECK && entries > 10 * ENTRIES_PER_STOP_CHECK,
+            "{entries}"
+        );
         let gone = || true;
         assert_eq!(observations.reversal(StopSignal::when(&gone)), None);
     }

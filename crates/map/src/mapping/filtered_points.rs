@@ -49,8 +49,8 @@ impl TimedPoints {
 }
 
 impl FilteredPoints {
-    /// Filters the points of a scan. A point that is not finite means "no return" in every depth camera: it is left out, or an error
-    /// where the scan is `strict`. Times that are no numbers are those of points that do not count.
+    /// Filters the points of a scan. A point that is not finite means "no return" in every depth camera: it is left
+    /// out, or an error where the scan is `strict`. Times that are no numbers are those of points that do not count.
     ///
     /// # Errors
     /// No point is left, a strict scan has a point that is not finite, or the filter is not valid.

@@ -16,8 +16,8 @@ pub struct LocatedScan {
     pub alignment: Alignment,
     /// How long it took to find it.
     pub align_time: Duration,
-    /// The map was empty, so that the scan went to its guess. Who inserts it must see to it that the map is still empty
-    /// then, or locate it again.
+    /// The map was empty, so that the scan went to its guess. Whatever inserts it must see to it that the map is still
+    /// empty then, or locate it again.
     pub is_first: bool,
     /// The velocity of the sensor that its points were deskewed with; none of points that were measured at once, or
     /// where the velocity is not known.

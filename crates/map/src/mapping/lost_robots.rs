@@ -9,8 +9,8 @@ use crate::geometry::{Point, Pose};
 use crate::map::{RobotName, SessionName};
 use crate::sync::{Mutex, Rank};
 
-/// Lost robots that are remembered, at most; beyond, one goes that has no scan in the map, or else the one whose last scan
-/// came longest ago.
+/// Lost robots that are remembered, at most; beyond, one goes that has no scan in the map, or else the one whose last
+/// scan came longest ago.
 pub const LOST_ROBOTS_MAX: usize = 64;
 
 /// For how long a robot is remembered whose scans no longer come.
@@ -174,8 +174,8 @@ impl LostRobots {
     }
 
     /// Begins a search for the scan of the robot that was noted last: one at a time, and no sooner after the one before
-    /// it than `interval`. `query` is told how many searches for the robot there are with it, when that scan was taken and
-    /// which way was down.
+    /// it than `interval`. `query` is told how many searches for the robot there are with it, when that scan was taken
+    /// and which way was down.
     pub(super) fn begin_search(
         &self,
         robot: &RobotName,

@@ -1,7 +1,9 @@
 //! The whole loop (paper III-B): a scan is located, judged, recorded and inserted.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use super::carving::Carving;
+use super::decision::Decision;
 use super::error::MappingError;
 use super::located_scan::ScanOutcome;
 use super::scan::Scan;
@@ -23,21 +25,16 @@ impl ScanMapper<'_> {
             true => located,
             false => self.search_at_once(scan, located, stop),
         };
-        let located = self.told(scan, located);
-        self.sightings.note(scan, &located);
-        if !located.is_accepted() && !scan.force {
-            return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
-        }
         let start = Instant::now();
-        let mut record = self.record(scan, &located, stop)?;
-        let carving = self.carve(scan, &located, &record, stop)?;
-        record.carved.clone_from(&carving.voxels);
-        let is_new = !self.note_stationary(scan, &record);
-        let committed = is_new.then(|| {
-            let committer = self.map.committer();
-            record.carved = carving.at(self.map.revision());
-            committer.insert_scan(record)
-        });
+        let (located, committed) = match self.decide(scan, located, stop)? {
+            Decision::Refused(located) | Decision::Stationary(located) => (located, None),
+            Decision::Insert { located, mut record, carved_at } => {
+                let committer = self.map.committer();
+                let carving = Carving { voxels: std::mem::take(&mut record.carved), revision: carved_at };
+                record.carved = carving.at(self.map.revision());
+                (located, Some(committer.insert_scan(*record)))
+            }
+        };
         Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
     }
 }

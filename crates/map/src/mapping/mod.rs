@@ -2,13 +2,15 @@
 //!
 //! [`ScanMapper::map_scan`] is the whole loop, and reads like the paper: the scan is located by aligning it to the map
 //! from a guess, judged, turned into a record of voxels and moments, and inserted with its pose. A server, which has to
-//! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::record`] and
-//! [`ScanMapper::note_stationary`] by themselves and inserts through its commit queue.
+//! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::recover`] and
+//! [`ScanMapper::decide`] by themselves and inserts through its commit queue.
 //!
-//! Begin with `map_scan`, the loop, and `scan_mapper`, its steps; a [`Scan`] goes in, a [`ScanOutcome`] comes out.
-//! `recovery` finds robots again whose scans were refused, and `carving` takes out what a scan saw through.
+//! Begin with `map_scan`, the loop, `decision`, what becomes of a scan, and `scan_mapper`, its steps; a [`Scan`] goes
+//! in, a [`ScanOutcome`] comes out. `recovery` finds robots again whose scans were refused, and `carving` takes out
+//! what a scan saw through.
 
 mod carving;
+mod decision;
 mod deskew;
 mod error;
 mod filtered_points;
@@ -33,6 +35,7 @@ pub use carving::{
     CARVING_GRAZING_MAX_DEG, CARVING_GRAZING_MIN_DEG, CARVING_MARGIN_MAX, CARVING_RANGE_MAX_M, Carving,
     CarvingSettings, CarvingSettingsError,
 };
+pub use decision::Decision;
 pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;

@@ -21,7 +21,8 @@ pub struct RecoverySettings {
     /// How fast the distance grows in which it is looked for, with the time since its last good pose, meters a second.
     /// 5. Where scans have no timestamps, the whole map is searched.
     pub speed_max_m_per_s: f64,
-    /// The first search takes the sensor to be as upright as at its last good pose, which bounds a third of the cells. True.
+    /// The first search takes the sensor to be as upright as at its last good pose, which bounds a third of the cells.
+    /// True.
     pub keeps_tilt: bool,
     /// Shortest time between two searches for the same robot. 0.
     pub search_interval: Duration,
@@ -44,8 +45,8 @@ impl Default for RecoverySettings {
 
 /// Kinds of searches, one after the other: with the last good tilt, and with all orientations.
 pub(super) const KINDS_OF_SEARCH: u64 = 2;
-/// Finest search voxels within a scan's range in these searches: fewer than where a caller asks for one. With 28 about as many real scans
-/// are found, and up to four times as many cells are bounded.
+/// Finest search voxels within a scan's range in these searches: fewer than where a caller asks for one. With 28 about
+/// as many real scans are found, and up to four times as many cells are bounded.
 const RESOLUTIONS_PER_RANGE: f64 = 20.0;
 
 impl RecoverySettings {

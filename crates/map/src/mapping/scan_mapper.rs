@@ -75,8 +75,8 @@ impl<'a> ScanMapper<'a> {
         Self { map, sightings, settings, recovery: None }
     }
 
-    /// This mapper, which looks from one start alone, for no lost robot, and for some 30 ms: the answer holds where it is
-    /// accepted and [wants no more starts](Alignment::wants_more_starts).
+    /// This mapper, which looks from one start alone, for no lost robot, and for some 30 ms: the answer holds where it
+    /// is accepted and [wants no more starts](Alignment::wants_more_starts).
     #[must_use]
     pub fn from_one_start(self) -> Self {
         let mut settings = self.settings;
@@ -98,10 +98,10 @@ impl<'a> ScanMapper<'a> {
 
     /// Finds where a scan was taken; changes nothing.
     ///
-    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other
-    /// one is aligned from its guess, or only judged there where the caller wants it at its guess. Points with times are
-    /// deskewed: first by the motion that the guess tells, then, once the alignment has found the pose, by the motion to
-    /// that, and aligned again.
+    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every
+    /// other one is aligned from its guess, or only judged there where the caller wants it at its guess. Points with
+    /// times are deskewed: first by the motion that the guess tells, then, once the alignment has found the pose, by
+    /// the motion to that, and aligned again.
     ///
     /// # Errors
     /// The guess needs a pose that is not there, or `stop` said so.
@@ -158,8 +158,8 @@ impl<'a> ScanMapper<'a> {
         self.settings.deskew.velocity((&last, last_ns), (map_from_sensor, scan.timestamp_ns))
     }
 
-    /// The record of a scan where it was found: every voxel it touches, the moments of its points where the map keeps them,
-    /// its pose, and its viewpoint where it sees something new.
+    /// The record of a scan where it was found: every voxel it touches, the moments of its points where the map keeps
+    /// them, its pose, and its viewpoint where it sees something new.
     ///
     /// # Errors
     /// No point lies within the map's range, or `stop` said so.
@@ -231,8 +231,8 @@ impl<'a> ScanMapper<'a> {
         met
     }
 
-    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, the
-    /// scan does not fit, or its pose is not [beyond doubt](Alignment::is_beyond_doubt): what is real must not go.
+    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve,
+    /// the scan does not fit, or its pose is not [beyond doubt](Alignment::is_beyond_doubt): what is real must not go.
     ///
     /// They are those of the map's revision that the answer names: whoever inserts the scan later
     /// [cuts](Carving::cut) them to what is still there.
@@ -258,11 +258,11 @@ impl<'a> ScanMapper<'a> {
         CarvingScan { rays, record, moved_m: scan.moved_m(velocity) }.carve(self.map, &settings, stop)
     }
 
-    /// True of a scan that shows again what its robot's last one showed, from where that was taken, carves nothing, and sees nothing newly. That
-    /// the robot was seen there is noted for its next guess.
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken, carves nothing, and
+    /// sees nothing newly. That the robot was seen there is noted for its next guess.
     ///
     /// Never true of a scan that the caller wants at its guess, or in the map whatever it shows (`force`).
-    pub fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
+    pub(super) fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
         let changes_what_is_free = !record.carved.is_empty() || record.viewpoint.is_some();
         let is_kept = scan.at_guess || scan.force || changes_what_is_free;
         let Some(settings) = self.settings.stationary.filter(|_| !is_kept) else {

@@ -15,10 +15,10 @@ pub const SIGHTINGS_MAX: usize = 4096;
 
 /// The last sighting of each robot, in memory.
 ///
-/// A scan of a robot that stands still is accepted and not stored (see [`StationarySettings`](super::StationarySettings)),
-/// so that its trajectory ends where it stopped. The guess for its next scan has to know that it stood: otherwise its
-/// last motion would be extrapolated over all the time since. Operators see here when a robot was last heard of, and
-/// whether its scans fit.
+/// A scan of a robot that stands still is accepted and not stored (see
+/// [`StationarySettings`](super::StationarySettings)), so that its trajectory ends where it stopped. The guess for its
+/// next scan has to know that it stood: otherwise its last motion would be extrapolated over all the time since.
+/// Operators see here when a robot was last heard of, and whether its scans fit.
 #[derive(Debug)]
 pub struct Sightings(Mutex<HashMap<RobotName, Entry>>);
 
@@ -106,8 +106,8 @@ impl Sightings {
         standing.filter(|standing| standing.after == last.revision)
     }
 
-    /// True of a robot whose last accepted scan came right after a refused one: from the one accepted before to it no velocity is
-    /// taken, since it may have been placed too far along.
+    /// True of a robot whose last accepted scan came right after a refused one: from the one accepted before to it no
+    /// velocity is taken, since it may have been placed too far along.
     pub(super) fn follows_refused(&self, robot: &RobotName) -> bool {
         self.0.lock().get(robot).is_some_and(|entry| entry.follows_refused)
     }

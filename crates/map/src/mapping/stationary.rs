@@ -23,7 +23,8 @@ impl Default for StationarySettings {
 }
 
 impl StationarySettings {
-    /// True of a scan that shows again what `last`, its robot's last one that was kept, showed, from where that was taken.
+    /// True of a scan that shows again what `last`, its robot's last one that was kept, showed, from where that was
+    /// taken.
     pub(super) fn is_stationary(
         &self,
         map: &MultiResolutionMap,

@@ -1,4 +1,5 @@
-//! Which scans leave a viewpoint (paper III-B: free space is generated from recorded poses), and which viewpoints make room.
+//! Which scans leave a viewpoint (paper III-B: free space is generated from recorded poses), and which viewpoints make
+//! room.
 
 use std::borrow::Cow;
 
@@ -17,8 +18,8 @@ pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 64 << 20;
 
 /// When a scan sees something new, so that it leaves a viewpoint.
 ///
-/// Viewpoints are no nearer to each other than this but for what they see, whichever robot left them, so that their number grows with
-/// the space that robots saw, not with time.
+/// Viewpoints are no nearer to each other than this but for what they see, whichever robot left them, so that their
+/// number grows with the space that robots saw, not with time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewpointSettings {
     /// Bytes of memory of all viewpoints of a map; 0 keeps none. 64 MiB: some 5,000.
@@ -27,14 +28,15 @@ pub struct ViewpointSettings {
     pub distance_m: f64,
     /// Or that is turned by more than this against those that are nearer, degrees. 15.
     pub rotation_deg: f64,
-    /// A scan from a new pose is new if this share of what it sees was unknown. 0.003: who passes between two viewpoints that saw
-    /// all of it already leaves none.
+    /// A scan from a new pose is new if this share of what it sees was unknown. 0.003: who passes between two
+    /// viewpoints that saw all of it already leaves none.
     pub unknown_from_new_pose: f64,
-    /// A scan of a robot that drives by is new from a known pose if this share of what it sees was unknown. 0.05: it sees more from the
-    /// next new one.
+    /// A scan of a robot that drives by is new from a known pose if this share of what it sees was unknown. 0.05: it
+    /// sees more from the next new one.
     pub unknown_from_known_pose: f64,
-    /// A scan of a robot that stands is new from a known pose if it sees through so much of space that nobody saw through, cubic meters,
-    /// where space farther than 3 m away counts less, see [`newly_seen_m3`]. 0.15: a door was opened, somebody left, a pallet was fetched.
+    /// A scan of a robot that stands is new from a known pose if it sees through so much of space that nobody saw
+    /// through, cubic meters, where space farther than 3 m away counts less, see [`newly_seen_m3`]. 0.15: a door was
+    /// opened, somebody left, a pallet was fetched.
     pub newly_seen_standing_m3: f64,
     /// What is further away is seen up to here, meters. 60.
     pub range_max_m: f32,
@@ -56,8 +58,8 @@ impl Default for ViewpointSettings {
 
 /// Rays that are looked along for what is unknown, where little hangs on it.
 const RAYS: usize = 300;
-/// Rays of an image that are looked along before it is kept. Of few rays chance lets some of a thousand scans see something new that a
-/// robot has seen in each of its rounds.
+/// Rays of an image that are looked along before it is kept. Of few rays chance lets some of a thousand scans see
+/// something new that a robot has seen in each of its rounds.
 const RAYS_OF_IMAGE: usize = 3000;
 /// What some rays tell to be newly seen may be so much less than what the image tells.
 const ROUGHLY: f64 = 0.5;
@@ -83,8 +85,8 @@ pub(super) struct SeenScan<'a> {
 }
 
 impl ViewpointSettings {
-    /// The viewpoint that a scan leaves beside those that are there; none of a scan that sees nothing new, and none once `stop` says
-    /// so.
+    /// The viewpoint that a scan leaves beside those that are there; none of a scan that sees nothing new, and none
+    /// once `stop` says so.
     pub(super) fn viewpoint_of(
         &self,
         scan: SeenScan<'_>,
@@ -114,7 +116,7 @@ impl ViewpointSettings {
         let image = RangeImage::of_points(&ends, sweep, IMAGE_BYTES_MAX)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown =
-            share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.sees_through(point));
+            share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.is_free(point));
         if !least.is_seen_by(&viewpoint, unknown, viewpoints) {
             return None;
         }
@@ -122,8 +124,9 @@ impl ViewpointSettings {
         Some(ViewpointRecord { image: viewpoint.image().clone(), displaced })
     }
 
-    /// The revisions of the viewpoints that go so that `viewpoint` has room, ascending: of some that are compared those that add least.
-    /// None where it adds less than they do, `unknown` being the share of what it sees, and once stopped.
+    /// The revisions of the viewpoints that go so that `viewpoint` has room, ascending: of some that are compared those
+    /// that add least. None where it adds less than they do, `unknown` being the share of what it sees, and once
+    /// stopped.
     fn displaced_by(
         &self,
         viewpoint: &Viewpoint,
@@ -141,7 +144,7 @@ impl ViewpointSettings {
                 let revision = left.swap_remove(random.random_range(0..left.len()));
                 let kept = viewpoints.get(revision)?;
                 let by_others =
-                    |point| viewpoint.sees_through(point) || viewpoints.others_see_through(point, revision);
+                    |point| viewpoint.is_free(point) || viewpoints.is_free_by_others(point, revision);
                 compared.push((
                     share_unknown(&samples_of(kept, RAYS), by_others),
                     revision,
@@ -196,8 +199,8 @@ impl Least {
             Self::Share(least) => unknown_to(known, map_from_sensor, sweep, spread(ends)) >= least,
             Self::Space(least_m3) => {
                 let seen = ends.iter().filter_map(|end| sweep.limited(end.xyz()));
-                let mut gaze = known.gaze();
-                newly_seen_by_rays_m3(map_from_sensor, seen, |place| gaze.sees_through(place))
+                let mut cache = known.cache();
+                newly_seen_by_rays_m3(map_from_sensor, seen, |place| cache.is_free(place))
                     >= ROUGHLY * least_m3
             }
         }
@@ -208,8 +211,8 @@ impl Least {
         match self {
             Self::Share(least) => unknown >= least,
             Self::Space(least_m3) => {
-                let mut gaze = known.gaze();
-                newly_seen_m3(viewpoint, |place| gaze.sees_through(place)) >= least_m3
+                let mut cache = known.cache();
+                newly_seen_m3(viewpoint, |place| cache.is_free(place)) >= least_m3
             }
         }
     }
@@ -224,7 +227,7 @@ fn unknown_to<'p>(
 ) -> f64 {
     let seen = points.filter_map(|point| sweep.limited(point.xyz()));
     let samples: Vec<_> = seen.flat_map(|offset| along(map_from_sensor, offset)).collect();
-    share_unknown(&samples, |point| viewpoints.sees_through(point))
+    share_unknown(&samples, |point| viewpoints.is_free(point))
 }
 
 /// Some of the points, from all over the scan.
@@ -245,8 +248,9 @@ fn samples_of(viewpoint: &Viewpoint, rays: usize) -> Vec<[f64; 3]> {
     let seen: Vec<_> = viewpoint.image().seen().collect();
     let some = seen.iter().step_by(seen.len().div_ceil(rays).max(1));
     let places = some.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset));
-    // Not all that lies before the end of a ray: from a moving sensor it has to be seen from where others were taken, too.
-    places.filter(|&place| viewpoint.sees_through(place)).collect()
+    // Not all that lies before the end of a ray: from a moving sensor it has to be seen from where others were taken,
+    // too.
+    places.filter(|&place| viewpoint.is_free(place)).collect()
 }
 
 /// The share of places that are not known.
@@ -322,7 +326,7 @@ mod tests {
         );
         // The room is known as well as by all of them.
         let place = |i: usize| [(i % 20) as f64 * 0.35 - 3.4, (i / 20) as f64 * 0.35 - 3.4, 0.1];
-        let seen = |set: &ViewpointSet| (0..400).filter(|&i| set.sees_through(place(i))).count();
+        let seen = |set: &ViewpointSet| (0..400).filter(|&i| set.is_free(place(i))).count();
         assert!(seen(&kept) * 100 >= seen(&one) * 97, "{} of {}", seen(&kept), seen(&one));
         assert_eq!(drive(&ViewpointSettings { bytes_max: 0, ..ViewpointSettings::default() }, 1).0.len(), 0);
     }

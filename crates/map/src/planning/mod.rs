@@ -1,7 +1,7 @@
 //! What planners ask of a map, each question at one revision unless others go first meanwhile: does a body fit, at
 //! poses and along motions; where rays end; what is nearest; what the map is seen from above.
 //!
-//! Of bodies, [`Body`] is what is asked about, [`Planner`] who is asked, and [`PlanningView`] has the questions.
+//! [`Body`] is what is asked about, [`Planner`] answers, and [`PlanningView`] has the questions.
 //! `clearance` defines when a ball meets a voxel, and is what makes the answers fast; `check` asks it about bodies.
 //! Each other question is a function of a [`MapView`](crate::map::MapView) and a request of plain slices, and answers
 //! with plain arrays.

@@ -14,12 +14,13 @@ pub struct PointFilter {
     pub range_min_m: Option<f64>,
     /// Distance from the sensor, meters; farther points are skipped. None: no such limit.
     pub range_max_m: Option<f64>,
-    /// Distance from the sensor, meters: from here on a point tells that nothing was met up to here, in a driver's way of saying "no
-    /// return" with a direction. It is skipped. None: every point was met.
+    /// Distance from the sensor, meters: from here on a point tells that nothing was met up to here, in a driver's way
+    /// of saying "no return" with a direction. It is skipped. None: every point was met.
     pub no_return_m: Option<f64>,
     /// The robot's own body in the sensor frame, meters: smallest and largest corner; points within are skipped.
     pub body_m: Option<([f64; 3], [f64; 3])>,
-    /// Points at exactly 0 0 0 count as any other. Otherwise they are skipped: most drivers write them where nothing returned.
+    /// Points at exactly 0 0 0 count as any other. Otherwise they are skipped: most drivers write them where nothing
+    /// returned.
     pub keep_zeros: bool,
     /// Finite points beyond `range_max_m` say nothing. Otherwise they tell that their rays met nothing up to there.
     pub beyond_range_is_noise: bool,
@@ -49,7 +50,8 @@ pub enum PointFilterError {
     /// A range that is negative or not finite; the payload is the field and its value.
     #[error("{0} must be finite and not negative, got {1}")]
     Range(&'static str, f64),
-    /// `range_min_m` is not below the other limit, so that nothing would pass; the payload is that, the other's name, and its value.
+    /// `range_min_m` is not below the other limit, so that nothing would pass; the payload is that, the other's name,
+    /// and its value.
     #[error("range_min_m {0} must be below {1} {2}")]
     Empty(f64, &'static str, f64),
     /// A box whose corners are not finite or not in order.
@@ -97,7 +99,8 @@ impl PointFilter {
         }
     }
 
-    /// True of a point (sensor frame) at which a ray ended: it is finite, and not the 0 0 0 of a driver for which nothing returned.
+    /// True of a point (sensor frame) at which a ray ended: it is finite, and not the 0 0 0 of a driver for which
+    /// nothing returned.
     pub fn is_return(&self, point: Point) -> bool {
         point.is_finite() && (self.keep_zeros || point.xyz() != [0.0; 3])
     }
@@ -118,8 +121,8 @@ impl PointFilter {
             && !self.is_of_robot(point)
     }
 
-    /// True of a finite point (sensor frame) that is skipped since it lies on the robot itself, or too near to be anything else. It hides
-    /// what lies behind it.
+    /// True of a finite point (sensor frame) that is skipped since it lies on the robot itself, or too near to be
+    /// anything else. It hides what lies behind it.
     pub fn is_of_robot(&self, point: Point) -> bool {
         if !self.is_return(point) {
             return false;
@@ -129,9 +132,10 @@ impl PointFilter {
             || self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])))
     }
 
-    /// Up to where a point (sensor frame) that is skipped as too far tells that nothing was met: to `no_return_m` where nothing was met
-    /// at all, and to itself where it is nearer than that. None of a point that is kept, and of one without a direction; none at all
-    /// where nobody says from where on nothing was met: see [`PointFilter::beyond_to`].
+    /// Up to where a point (sensor frame) that is skipped as too far tells that nothing was met: to `no_return_m` where
+    /// nothing was met at all, and to itself where it is nearer than that. None of a point that is kept, and of one
+    /// without a direction; none at all where nobody says from where on nothing was met: see
+    /// [`PointFilter::beyond_to`].
     pub fn passed_to(&self, point: Point) -> Option<Point> {
         let no_return_m = self.no_return_m.filter(|_| self.is_return(point))?;
         if self.is_no_return(point) {
@@ -140,8 +144,9 @@ impl PointFilter {
         self.is_beyond(point).then_some(point)
     }
 
-    /// Where nobody says from where on nothing was met, up to where the ray of a point (sensor frame) beyond `range_max_m` met nothing:
-    /// to `range_max_m`, since a driver may write any distance for "nothing returned". None of all other points.
+    /// Where nobody says from where on nothing was met, up to where the ray of a point (sensor frame) beyond
+    /// `range_max_m` met nothing: to `range_max_m`, since a driver may write any distance for "nothing returned". None
+    /// of all other points.
     pub fn beyond_to(&self, point: Point) -> Option<Point> {
         let max_m = self.range_max_m.filter(|_| self.no_return_m.is_none() && self.is_return(point))?;
         self.is_beyond(point).then(|| cut_to(point, max_m))

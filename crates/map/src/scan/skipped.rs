@@ -52,13 +52,14 @@ impl SkippedPoints {
         self.reasons().iter().map(|(count, _)| count).sum()
     }
 
-    /// True when half of the points or more lie beyond the largest range or the map's range: a limit is wrong, or the unit.
+    /// True when half of the points or more lie beyond the largest range or the map's range: a limit is wrong, or the
+    /// unit.
     pub fn is_mostly_beyond(&self) -> bool {
         self.points > 0 && (self.too_far + self.beyond_map) * 2 >= self.points
     }
 
-    /// The reason of a scan's verdict, with what was skipped where that may explain it: of a scan that is not accepted, or
-    /// most of which lies beyond.
+    /// The reason of a scan's verdict, with what was skipped where that may explain it: of a scan that is not accepted,
+    /// or most of which lies beyond.
     pub fn explain(&self, is_accepted: bool, reason: &str) -> String {
         match self.total() > 0 && (!is_accepted || self.is_mostly_beyond()) {
             true => format!("{reason}; {self}"),

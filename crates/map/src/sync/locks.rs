@@ -14,7 +14,7 @@ pub struct Mutex<T> {
     value: primitive::Mutex<T>,
 }
 
-/// A lock that many readers hold at a time, or one writer. Who waits to write goes before readers that come later.
+/// A lock that many readers hold at a time, or one writer. A waiting writer goes before readers that come later.
 #[derive(Debug)]
 pub struct RwLock<T> {
     rank: Rank,

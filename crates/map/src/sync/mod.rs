@@ -12,8 +12,8 @@
 //!
 //! With `debug_assertions`, so in every test, a breach panics at the line that commits it (`checks`). Without, the
 //! locks are `parking_lot`'s and cost nothing more. With the feature `shuttle`, which is for two tests alone
-//! (`tests/commit_protocol.rs` here, `src/tests/modeled.rs` of the service), they are those of a model checker: it runs a test's threads one at a time, and at
-//! every lock chooses who goes on.
+//! (`tests/commit_protocol.rs` here, `src/tests/modeled.rs` of the service), they are those of a model checker: it runs
+//! a test's threads one at a time, and at every lock chooses who goes on.
 
 mod checks;
 mod locks;

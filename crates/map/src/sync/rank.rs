@@ -9,7 +9,7 @@ pub enum Rank {
     Journal,
     /// The turn to change a map.
     Commit,
-    /// Held by who reads a map for long; a change waits for it where no short reader queues behind.
+    /// Held by long reads of a map; a change waits for it where no short reader queues behind.
     LongRead,
     /// The moments of shard i. Several are taken in ascending order.
     Moments(u8),
@@ -31,7 +31,7 @@ pub enum Rank {
 
 #[cfg(debug_assertions)]
 impl Rank {
-    /// True of a lock of a map's content: nobody who holds it may wait for a disk.
+    /// True of a lock of a map's content: its holder may not wait for a disk.
     pub(super) fn forbids_file_operations(self) -> bool {
         self >= Self::Commit
     }

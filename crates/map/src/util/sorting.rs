@@ -10,7 +10,7 @@ pub fn sort_by_key_until<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K + Cop
     sort_while(items, key, &|| !stop.is_stopped());
 }
 
-/// [`sort_by_key_until`] that lets other work go first between its parts: for who holds no lock.
+/// [`sort_by_key_until`] that lets other work go first between its parts: for callers that hold no lock.
 pub fn sort_by_key_giving_way<T, K: Ord>(
     items: &mut [T],
     key: impl Fn(&T) -> K + Copy,

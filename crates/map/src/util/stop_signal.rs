@@ -43,8 +43,8 @@ impl<'a> StopSignal<'a> {
         Self { turns: Some(turns), ..self }
     }
 
-    /// True where [`StopSignal::give_way`] would let other work go first: who holds a lock asks before it gives it back
-    /// for that.
+    /// True where [`StopSignal::give_way`] would let other work go first: the holder of a lock asks before it gives it
+    /// back for that.
     pub fn is_way_due(self) -> bool {
         self.turns.is_some_and(GiveWay::is_due)
     }
@@ -90,8 +90,8 @@ impl<'a> StopSignal<'a> {
         self.is_cancelled() || self.is_time_up()
     }
 
-    /// The items, with a look before the first and before every so many more. Once stopped there are no more of them, so
-    /// that who needs them all asks again at the end.
+    /// The items, with a look before the first and before every so many more. Once stopped there are no more of them,
+    /// so that who needs them all asks again at the end.
     pub fn paced<I: IntoIterator>(
         self,
         items: I,

@@ -7,10 +7,12 @@ const TILES_MAX: usize = 40;
 /// Pixels along the side of a tile.
 pub(super) const TILE_SIDE: usize = 8;
 
-/// The grid of pixels on each of the six faces of a cube around the sensor: `tiles` tiles of 8 x 8 pixels along each side.
+/// The grid of pixels on each of the six faces of a cube around the sensor: `tiles` tiles of 8 x 8 pixels along each
+/// side.
 ///
-/// A direction lies on the face of its largest coordinate, at the quotients of the two others and that one. So a pixel is found
-/// without a root and without an angle, and everything is computed in f32 in one order: the same pixel on every machine.
+/// A direction lies on the face of its largest coordinate, at the quotients of the two others and that one. So a pixel
+/// is found without a root and without an angle, and everything is computed in f32 in one order: the same pixel on
+/// every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct CubeMap {
     tiles: usize,
@@ -127,8 +129,8 @@ impl CubeMap {
         pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0)
     }
 
-    /// The angle, radians, of a small step to the right or up from the middle of a pixel, for a length of 1 on the face: towards its
-    /// edges less.
+    /// The angle, radians, of a small step to the right or up from the middle of a pixel, for a length of 1 on the
+    /// face: towards its edges less.
     pub(super) fn angle_of_step(self, pixel: [usize; 2], [right, _]: [isize; 2]) -> f32 {
         let [u, v] = self.middle(pixel);
         let along = if right != 0 { 1.0 + v * v } else { 1.0 + u * u };
@@ -145,7 +147,8 @@ impl CubeMap {
         [u, v].map(|along| along / depth.abs())
     }
 
-    /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).
+    /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on
+    /// others).
     pub(super) fn on_face(self, face: usize, [u, v]: [f32; 2]) -> [f32; 3] {
         let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
         match face / 2 {
@@ -156,7 +159,8 @@ impl CubeMap {
     }
 }
 
-/// The face that the point at `offset` lies on, where on it (-1 to 1 along each side), and its distance along the face's axis.
+/// The face that the point at `offset` lies on, where on it (-1 to 1 along each side), and its distance along the
+/// face's axis.
 #[inline(always)]
 fn face_of([x, y, z]: [f32; 3]) -> Option<(usize, [f32; 2], f32)> {
     let [ax, ay, az] = [x.abs(), y.abs(), z.abs()];

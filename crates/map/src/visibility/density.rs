@@ -8,7 +8,8 @@ const TILES: [usize; 11] = [40, 32, 25, 20, 16, 13, 10, 8, 6, 4, 2];
 const TILES_AT_FIRST: usize = 10;
 /// Largest share of the seen pixels beside which others are not seen though some behind these are.
 const GAPS_MAX: f64 = 0.05;
-/// What is farther apart than this is no gap between points of one surface, as the side of a square at depth 1: 8 degrees.
+/// What is farther apart than this is no gap between points of one surface, as the side of a square at depth 1: 8
+/// degrees.
 const GAP_MAX: f32 = 0.14;
 const _: () = assert!(TILE_SIDE * TILES[0] < 1 << 12, "all pixels have a number");
 
@@ -17,8 +18,8 @@ const _: () = assert!(TILE_SIDE * TILES[0] < 1 << 12, "all pixels have a number"
 pub(super) struct PointDensity {
     /// The finest pixels that leave few gaps of two or more of them between the points: finer ones would be a sieve.
     pub(super) map: CubeMap,
-    /// How far from each other the points lie as a rule, in the direction in which that is farther, as the side of a square at depth
-    /// 1: one pixel to two.
+    /// How far from each other the points lie as a rule, in the direction in which that is farther, as the side of a
+    /// square at depth 1: one pixel to two.
     pub(super) spacing: f32,
 }
 
@@ -102,7 +103,8 @@ impl SeenPixels {
 mod tests {
     use super::*;
 
-    /// Points on `rings` rings of some degrees from each other, a point every tenth of a degree on a quarter of the way around.
+    /// Points on `rings` rings of some degrees from each other, a point every tenth of a degree on a quarter of the way
+    /// around.
     fn rings(rings: usize, apart_deg: f32) -> Vec<[f32; 3]> {
         let point = |i: usize| {
             let elevation = ((i / 900) as f32 - (rings as f32 - 1.0) / 2.0) * apart_deg;

@@ -51,10 +51,11 @@ impl RangeImage {
         self.open_m.is_finite()
     }
 
-    /// The image as bytes: how many tiles there are along a side and 128 (1 byte; and 64 where rays ran on), the unit of depths (f32), how
-    /// far the sensor moved in meters (f32) and how far apart the rays lay at depth 1 (f32), from where on nothing was met in meters
-    /// (f32; where rays ran on), a bit for each tile of the six faces that says whether it is
-    /// kept, and the tiles that are. All little-endian. The first images, without the 128, told nothing of their rays.
+    /// The image as bytes: how many tiles there are along a side and 128 (1 byte; and 64 where rays ran on), the unit
+    /// of depths (f32), how far the sensor moved in meters (f32) and how far apart the rays lay at depth 1 (f32), from
+    /// where on nothing was met in meters (f32; where rays ran on), a bit for each tile of the six faces that says
+    /// whether it is kept, and the tiles that are. All little-endian. The first images, without the 128, told nothing
+    /// of their rays.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.stored_bytes());
         let tells_open = if self.tells_open() { TELLS_OPEN } else { 0 };

@@ -3,10 +3,11 @@
 use super::cube_map::{CubeMap, Pixel, Projection};
 use super::tile::TILE_PIXELS;
 
-/// Widest part of a pixel of which a point tells, as the side of a square at depth 1: 1.4 degrees. What lies between points is not
-/// looked at.
+/// Widest part of a pixel of which a point tells, as the side of a square at depth 1: 1.4 degrees. What lies between
+/// points is not looked at.
 pub(super) const SPACING_MAX: f32 = 0.025;
-/// How far from each other two points may lie that tell of what is between them, beside or above each other: 2.9 degrees.
+/// How far from each other two points may lie that tell of what is between them, beside or above each other: 2.9
+/// degrees.
 const GAP_MAX: f32 = 2.0 * SPACING_MAX;
 
 /// Scans whose points lie farther from each other as a rule tell less: 5 degrees.
@@ -60,9 +61,9 @@ impl NearestDepths {
         self.depths_m.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max)
     }
 
-    /// How far each pixel was seen, tile by tile: as far as the nearest of its parts, where half of these were seen or more. So what was
-    /// seen ends within half a pixel of where it does. Of a scan whose points lie `spacing` from each other as a rule, too far for that,
-    /// all parts have to be seen.
+    /// How far each pixel was seen, tile by tile: as far as the nearest of its parts, where half of these were seen or
+    /// more. So what was seen ends within half a pixel of where it does. Of a scan whose points lie `spacing` from each
+    /// other as a rule, too far for that, all parts have to be seen.
     pub(super) fn seen_tiles(&self, spacing: f32) -> Vec<SeenTile> {
         let all = self.parts * self.parts;
         let least = if spacing <= SPARSE { all.div_ceil(2) } else { all };
@@ -87,8 +88,8 @@ impl NearestDepths {
         (count >= least).then_some(depth_m)
     }
 
-    /// How deep a part was seen: up to its own nearest point, or to the nearer of two that it lies between, since points are not where
-    /// parts are.
+    /// How deep a part was seen: up to its own nearest point, or to the nearer of two that it lies between, since
+    /// points are not where parts are.
     fn seen_m(&self, part: Pixel) -> Option<f32> {
         self.point_m(part).or_else(|| {
             let [beside, above] = [[1, 0], [0, 1]].map(|step| self.seen_between_m(part, step));

@@ -5,10 +5,12 @@ use super::vectors::norm;
 use super::viewpoint::Viewpoint;
 use crate::geometry::Pose;
 
-/// Where along a ray it is asked who saw through there before, and where the part of the ray ends that the answer stands for.
+/// Where along a ray it is asked whether it was free before, and where the part of the ray ends that the answer stands
+/// for.
 const ALONG: [(f32, f32); 6] =
     [(0.15, 0.225), (0.3, 0.375), (0.45, 0.525), (0.6, 0.675), (0.75, 0.825), (0.9, 1.0)];
-/// Space up to here counts by its volume, and less the farther away it is: what is before a robot is in its way, meters.
+/// Space up to here counts by its volume, and less the farther away it is: what is before a robot is in its way,
+/// meters.
 const NEAR_M: f32 = 3.0;
 /// Tiles along the side of a face: pixels of 1.9 degrees, of which one ray is looked along before an image is made.
 const TILES: usize = 6;
@@ -24,8 +26,8 @@ struct NewlySeen {
     is_new: Vec<u8>,
 }
 
-/// The volume of space that `viewpoint` sees through and `is_known` says nobody saw through before, cubic meters. Space farther than 3 m
-/// from it counts less, by the cube of the distance.
+/// The volume of space that `viewpoint` sees through and `is_known` says nobody saw through before, cubic meters. Space
+/// farther than 3 m from it counts less, by the cube of the distance.
 pub fn newly_seen_m3(viewpoint: &Viewpoint, is_known: impl FnMut([f64; 3]) -> bool) -> f64 {
     let image = viewpoint.image();
     let mut newly = NewlySeen::none(image.map());
@@ -35,12 +37,12 @@ pub fn newly_seen_m3(viewpoint: &Viewpoint, is_known: impl FnMut([f64; 3]) -> bo
             newly.seen_m[at] = depth_m * norm(image.map().direction(face, pixel));
         }
     }
-    newly.look(viewpoint.map_from_sensor(), is_known, |place| viewpoint.sees_through(place));
+    newly.look(viewpoint.map_from_sensor(), is_known, |place| viewpoint.is_free(place));
     newly.coherent_m3()
 }
 
-/// [`newly_seen_m3`] of what a scan would see whose rays ended at `ends` (sensor frame): found in less time than it takes to make its image,
-/// and more or less so.
+/// [`newly_seen_m3`] of what a scan would see whose rays ended at `ends` (sensor frame): found in less time than it
+/// takes to make its image, and more or less so.
 pub fn newly_seen_by_rays_m3(
     map_from_sensor: &Pose,
     ends: impl Iterator<Item = [f32; 3]>,
@@ -93,7 +95,8 @@ impl NewlySeen {
         }
     }
 
-    /// The volume of what is new in squares of two by two pixels, in all of these that were seen and in two of them at least.
+    /// The volume of what is new in squares of two by two pixels, in all of these that were seen and in two of them at
+    /// least.
     fn coherent_m3(&self) -> f64 {
         let side = self.map.pixels();
         let mut coherent = vec![0u8; self.is_new.len()];
@@ -133,7 +136,8 @@ fn length_m3(end_m: f32, parts: u8) -> f32 {
     sum
 }
 
-/// The volume a steradian up to a distance, where what is farther than [`NEAR_M`] counts less by the cube of its distance.
+/// The volume a steradian up to a distance, where what is farther than [`NEAR_M`] counts less by the cube of its
+/// distance.
 fn up_to_m3(range_m: f32) -> f32 {
     let near = NEAR_M.powi(3);
     if range_m <= NEAR_M { range_m.powi(3) / 3.0 } else { near / 3.0 + near * (range_m / NEAR_M).ln() }

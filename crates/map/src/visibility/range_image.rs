@@ -13,10 +13,11 @@ use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
-/// Tiles along the side of a face, finest first, fewer than an image's first byte has room for (`image_bytes`): pixels of 0.6 to 7 degrees.
+/// Tiles along the side of a face, finest first, fewer than an image's first byte has room for (`image_bytes`): pixels
+/// of 0.6 to 7 degrees.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
-/// How much nearer than where nothing was met a pixel may tell it, as a share: its depth is the least of rays that ran up to 2.9 degrees
-/// away, and of a place in it.
+/// How much nearer than where nothing was met a pixel may tell it, as a share: its depth is the least of rays that ran
+/// up to 2.9 degrees away, and of a place in it.
 const OPEN_SLACK: f32 = 0.035;
 /// Depths in the image's unit are at most this.
 pub(super) const DEPTH_MAX: f32 = u16::MAX as f32;
@@ -25,14 +26,15 @@ const MOVED_PIXELS_MAX: f32 = 8.0;
 /// How much more coarser pixels have to tell, since they tell it less well.
 const WORTHWHILE: f32 = 1.03;
 
-/// How far a scan saw in each direction from its sensor: on the six faces of a cube around it, the depth along the face's
-/// axis up to which nothing was in the way (paper III-B: free space is generated from the recorded poses and the sensor).
+/// How far a scan saw in each direction from its sensor: on the six faces of a cube around it, the depth along the
+/// face's axis up to which nothing was in the way (paper III-B: free space is generated from the recorded poses and the
+/// sensor).
 ///
-/// A pixel tells the nearest of the points seen in it, so that a direction is never said to be seen further than the nearest
-/// surface there. Only tiles with something seen are kept: a camera spends its 8 kB on what it looks at.
+/// A pixel tells the nearest of the points seen in it, so that a direction is never said to be seen further than the
+/// nearest surface there. Only tiles with something seen are kept: a camera spends its 8 kB on what it looks at.
 ///
-/// Rays that a moving sensor took elsewhere count as taken from the image's place, up to [`Sweep::moved_m`] beside where they ran. So
-/// a place counts as seen through only where all that lies so near to it was.
+/// Rays that a moving sensor took elsewhere count as taken from the image's place, up to [`Sweep::moved_m`] beside
+/// where they ran. So a place counts as seen through only where all that lies so near to it was.
 #[derive(Clone, PartialEq)]
 pub struct RangeImage {
     pub(super) map: CubeMap,
@@ -67,9 +69,9 @@ pub(super) struct Rays {
     pub(super) spacing: f32,
 }
 
-/// What it takes to have seen well beyond a place.
+/// The evidence that proves a place empty: see [`RangeImage::proves_absent`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WellBeyond {
+pub struct AbsenceEvidence {
     /// How far behind it everything has to be that was seen around it, meters.
     pub margin_m: f32,
     /// How far from each other rays may have passed it, meters: what is larger than that was met by one.
@@ -77,10 +79,11 @@ pub struct WellBeyond {
 }
 
 impl RangeImage {
-    /// The image of at most `bytes_max` bytes of a scan whose rays ended at `points` (sensor frame, finite); none where nothing is seen.
+    /// The image of at most `bytes_max` bytes of a scan whose rays ended at `points` (sensor frame, finite); none where
+    /// nothing is seen.
     ///
-    /// Points of the robot itself belong to them: what lies behind it was not seen. Pixels are as fine as `bytes_max` allows and as
-    /// the points lie. Those in which the points lie far from each other are not seen.
+    /// Points of the robot itself belong to them: what lies behind it was not seen. Pixels are as fine as `bytes_max`
+    /// allows and as the points lie. Those in which the points lie far from each other are not seen.
     pub fn of_points(points: &[Point], sweep: Sweep, bytes_max: usize) -> Option<Self> {
         let offsets: Vec<_> = points.iter().filter_map(|point| sweep.limited(point.xyz())).collect();
         let PointDensity { map, spacing } = PointDensity::of(&offsets)?;
@@ -97,7 +100,8 @@ impl RangeImage {
         (!best.tiles.is_empty()).then_some(best)
     }
 
-    /// Tells the gaps between rays in the tiles that were seen there: pixels and their parts are too wide to tell of them.
+    /// Tells the gaps between rays in the tiles that were seen there: pixels and their parts are too wide to tell of
+    /// them.
     fn note_gaps(&mut self, gaps: &RayGaps<'_>) {
         gaps.for_each(|direction, gap| {
             let Some(Projection { face, pixel, .. }) = self.map.project(direction) else { return };
@@ -134,24 +138,26 @@ impl RangeImage {
         Self { map, unit_m, rays, open_m, places, tiles }
     }
 
-    /// True where the scan saw beyond the point at `offset` from the sensor, in its frame: the point was not hidden, and nothing
-    /// was there.
+    /// True where the scan proves the point at `offset` from the sensor, in its frame, to be free: the scan saw beyond
+    /// it.
     #[inline]
-    pub fn sees_through(&self, offset: [f32; 3]) -> bool {
+    pub fn is_free(&self, offset: [f32; 3]) -> bool {
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
-            self.sees_beyond((face, pixel), depth_m)
-                && (self.rays.moved_m == 0.0 || self.sees_beyond_around((face, pixel), depth_m, depth_m, 0))
+            self.depth_exceeds((face, pixel), depth_m)
+                && (self.rays.moved_m == 0.0
+                    || self.depth_exceeds_in_window((face, pixel), depth_m, depth_m, 0))
         })
     }
 
-    /// True where the scan saw well beyond the point at `offset`: in its own pixel and in all that lie around it, no surface that is
-    /// seen askew or in part is seen through so, nor what lies beside a rim, and nothing that fits between the rays.
-    pub fn sees_well_beyond(&self, offset: [f32; 3], least: WellBeyond) -> bool {
-        let WellBeyond { margin_m, gap_max_m } = least;
+    /// True where the scan proves that nothing is at the point at `offset`: it saw beyond it by a margin, in its own
+    /// pixel and in all around it, by rays that leave no larger gap. A surface that is seen askew or in part, what lies
+    /// beside a rim, and what fits between the rays are not proved absent.
+    pub fn proves_absent(&self, offset: [f32; 3], least: AbsenceEvidence) -> bool {
+        let AbsenceEvidence { margin_m, gap_max_m } = least;
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
             let distance_m = norm(offset);
             distance_m * self.gap_at((face, pixel)) <= gap_max_m
-                && self.sees_beyond_around((face, pixel), depth_m, depth_m + margin_m, 1)
+                && self.depth_exceeds_in_window((face, pixel), depth_m, depth_m + margin_m, 1)
         })
     }
 
@@ -165,20 +171,20 @@ impl RangeImage {
 
     /// True where a pixel was seen beyond a depth.
     #[inline(always)]
-    fn sees_beyond(&self, (face, pixel): Pixel, beyond_m: f32) -> bool {
+    fn depth_exceeds(&self, (face, pixel): Pixel, beyond_m: f32) -> bool {
         self.depth_m(face, pixel).is_some_and(|seen_m| beyond_m < seen_m)
     }
 
-    /// [`RangeImage::sees_beyond`] of all pixels in which what is so deep as `depth_m` can have been seen by a sensor that moved, and so many
-    /// more around them.
+    /// [`RangeImage::depth_exceeds`] of all pixels in which what is so deep as `depth_m` can have been seen by a sensor
+    /// that moved, and so many more around them.
     #[inline(never)]
-    fn sees_beyond_around(&self, pixel: Pixel, depth_m: f32, beyond_m: f32, more: isize) -> bool {
+    fn depth_exceeds_in_window(&self, pixel: Pixel, depth_m: f32, beyond_m: f32, more: isize) -> bool {
         let Some(moved) = self.moved_pixels(depth_m) else { return false };
         let around = || -(moved + more)..=moved + more;
         // What lies on another face is less deep there than here, so that no less is asked of it.
         around().all(|up| {
             around().all(|right| {
-                self.map.beside(pixel, [right, up]).is_some_and(|pixel| self.sees_beyond(pixel, beyond_m))
+                self.map.beside(pixel, [right, up]).is_some_and(|pixel| self.depth_exceeds(pixel, beyond_m))
             })
         })
     }
@@ -223,8 +229,8 @@ impl RangeImage {
         self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))
     }
 
-    /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw, and none of which is off by more than
-    /// `error_max_m`: at the rims of things a pixel does not tell where in it they lie.
+    /// Some of the places that the scan met, `wish` of them or fewer, from all over what it saw, and none of which is
+    /// off by more than `error_max_m`: at the rims of things a pixel does not tell where in it they lie.
     pub fn met(&self, wish: usize, error_max_m: f32) -> Vec<Met> {
         let met: Vec<Met> = self
             .kept_pixels()
@@ -241,8 +247,8 @@ impl RangeImage {
         kept.flat_map(|(tile, _)| self.map.pixels_of_tile(tile))
     }
 
-    /// What was met in a pixel. Its depth is that of the nearest point in it: how far off that is from the middle of the pixel is told
-    /// by the pixels around it.
+    /// What was met in a pixel. Its depth is that of the nearest point in it: how far off that is from the middle of
+    /// the pixel is told by the pixels around it.
     fn met_at(&self, (face, pixel): Pixel) -> Option<Met> {
         let depth_m = self.met_depth_m((face, pixel))?;
         let beside = [[-1, 0], [1, 0], [0, -1], [0, 1]].into_iter();

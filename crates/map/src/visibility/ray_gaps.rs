@@ -5,7 +5,8 @@ use super::cube_map::{CubeMap, FACES, Projection};
 /// Holes of a few lost rays are up to so many spacings of the rays wide, and long.
 const LOST_WIDTH: f32 = 2.2;
 const LOST_LENGTH: f32 = 5.0;
-/// How much of their width counts: a ray lost from a square grid leaves a hole two spacings wide, and one in a hundred is.
+/// How much of their width counts: a ray lost from a square grid leaves a hole two spacings wide, and one in a hundred
+/// is.
 const LOST_SHARE: f32 = 0.6;
 
 /// The gaps between the rays of a scan.
@@ -22,8 +23,8 @@ pub(super) struct RayGaps<'a> {
 type Bounds = [[f32; 2]; 2];
 
 impl RayGaps<'_> {
-    /// Calls `f` for the pixels between rays in which none ran, with the direction of the pixel's middle and how wide the gap is in which
-    /// it lies, radians.
+    /// Calls `f` for the pixels between rays in which none ran, with the direction of the pixel's middle and how wide
+    /// the gap is in which it lies, radians.
     pub(super) fn for_each(&self, mut f: impl FnMut([f32; 3], f32)) {
         // Face by face: all of them would take some memory.
         (0..FACES).for_each(|face| self.for_each_on(face, &mut f));
@@ -64,7 +65,8 @@ impl RayGaps<'_> {
         }
     }
 
-    /// How wide the gap is in which a pixel lies, radians; none of one at the edge of what was seen, without rays on both sides.
+    /// How wide the gap is in which a pixel lies, radians; none of one at the edge of what was seen, without rays on
+    /// both sides.
     fn width(&self, gaps: &[[f32; 2]], pixel: [usize; 2]) -> Option<f32> {
         let side = self.map.pixels();
         let at = pixel[1] * side + pixel[0];

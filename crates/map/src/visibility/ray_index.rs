@@ -3,8 +3,8 @@
 use super::cube_map::{CubeMap, FACES, Projection};
 use super::vectors::{across, dot, norm};
 
-/// Columns, and rows, of parts of a pixel, of each of which one ray is kept: more would tell little, and a scan may send all it has in one
-/// direction.
+/// Columns, and rows, of parts of a pixel, of each of which one ray is kept: more would tell little, and a scan may
+/// send all it has in one direction.
 const PARTS: usize = 8;
 /// Distance of the places of a ball's disc at which is looked, for a near ray that is 1 away.
 const STEP: f32 = 0.3;
@@ -90,9 +90,9 @@ impl RayIndex {
         Self { map, begins, ends }
     }
 
-    /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its disc lies farther
-    /// than `near_m` from such a ray, but for a few beside each other, since rays are lost here and there. So what is wider than twice
-    /// that, and in the ball, was met by one.
+    /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its
+    /// disc lies farther than `near_m` from such a ray, but for a few beside each other, since rays are lost here and
+    /// there. So what is wider than twice that, and in the ball, was met by one.
     pub(super) fn pass(&self, ball: Ball, near_m: f32) -> bool {
         let view = View { ball, distance_m: norm(ball.offset), across: across(ball.offset), near_m };
         let step_m = STEP * near_m;
@@ -104,8 +104,8 @@ impl RayIndex {
         places.filter(|&place| !self.runs_near(place, &view)).nth(PLACES_MISSED_MAX).is_none()
     }
 
-    /// How far from each other rays ran at most along the first axis of a window, wherever along the second, meters; no more than
-    /// twice the window is told. What is as long as the window and thicker than that was met by one.
+    /// How far from each other rays ran at most along the first axis of a window, wherever along the second, meters; no
+    /// more than twice the window is told. What is as long as the window and thicker than that was met by one.
     pub(super) fn widest_gap_m(&self, window: RayWindow) -> f32 {
         let RayWindow { offset, radius_m, across, half_m: [half_m, long_m] } = window;
         let view = View { ball: Ball { offset, radius_m }, distance_m: norm(offset), across, near_m: 0.0 };

@@ -12,8 +12,8 @@ const POINTS_OF_DENSITY: usize = 1 << 15;
 
 /// The depth of the nearest point of a scan in each pixel of a cube around its sensor.
 ///
-/// Unlike a [`RangeImage`](super::RangeImage) it is not kept, so that it need not be small: it tells what the points say and nothing
-/// of what lies between them.
+/// Unlike a [`RangeImage`](super::RangeImage) it is not kept, so that it need not be small: it tells what the points
+/// say and nothing of what lies between them.
 #[derive(Debug, Clone)]
 pub struct ScanImage {
     map: CubeMap,
@@ -24,8 +24,8 @@ pub struct ScanImage {
 impl ScanImage {
     /// The image of a scan of `points` (sensor frame, meters).
     ///
-    /// Its pixels are as fine as the points lie: between rings that meet a floor at a small angle, finer ones would see it farther away
-    /// than it is.
+    /// Its pixels are as fine as the points lie: between rings that meet a floor at a small angle, finer ones would see
+    /// it farther away than it is.
     pub fn of(points: &[Point]) -> Self {
         let some = points.iter().step_by(points.len().div_ceil(POINTS_OF_DENSITY).max(1));
         let offsets: Vec<[f32; 3]> = some.map(|point| point.xyz()).collect();

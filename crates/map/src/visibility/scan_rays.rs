@@ -9,8 +9,8 @@ pub struct ScanRays<'a> {
     pub met: &'a [Point],
     /// The ray met something farther away: up to there nothing was in its way.
     pub beyond: &'a [Point],
-    /// Nothing returned: where the rays beside it agree, nothing was in its way up to there. Things that swallow the light of a ray
-    /// are not there because of it.
+    /// Nothing returned: where the rays beside it agree, nothing was in its way up to there. Things that swallow the
+    /// light of a ray are not there because of it.
     pub no_returns: &'a [Point],
 }
 

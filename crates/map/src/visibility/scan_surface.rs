@@ -10,8 +10,8 @@ use super::vectors::{across, between, distance, norm};
 const SAMPLES_MAX: f32 = 32.0;
 /// Balls nearer than so many of their radii are not seen through: they would be looked at in too many directions.
 const NEAREST: f32 = 4.0;
-/// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both meet, and
-/// for where pixels are smallest, at the corners of the cube.
+/// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both
+/// meet, and for where pixels are smallest, at the corners of the cube.
 const FILLINGS: usize = 3;
 /// A ray without a return is believed as far as all that was met in so many pixels on each side of its own.
 const AGREE: isize = 2;
@@ -21,8 +21,8 @@ const NOT_SEEN: u32 = u32::MAX;
 /// How the points of a scan make a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSettings {
-    /// Smallest angle between a ray and a surface, radians: two points beside each other that only a surface at a smaller
-    /// one would join are the rim of the nearer one.
+    /// Smallest angle between a ray and a surface, radians: two points beside each other that only a surface at a
+    /// smaller one would join are the rim of the nearer one.
     pub grazing_rad: f32,
     /// Steps in range that are noise, meters.
     pub noise_m: f32,
@@ -30,11 +30,11 @@ pub struct SurfaceSettings {
     pub spacing_m: f32,
 }
 
-/// The surface that a scan shows, as it is seen from the sensor: on the six faces of a cube around it, the nearest point in
-/// each pixel, and which pixels beside each other show one surface.
+/// The surface that a scan shows, as it is seen from the sensor: on the six faces of a cube around it, the nearest
+/// point in each pixel, and which pixels beside each other show one surface.
 ///
-/// Pixels are as fine as the points lie, and no finer, so that a scan is not seen through a sieve: rows of points with rows
-/// between them in which there are none are one surface where they are no farther apart than two pixels.
+/// Pixels are as fine as the points lie, and no finer, so that a scan is not seen through a sieve: rows of points with
+/// rows between them in which there are none are one surface where they are no farther apart than two pixels.
 #[derive(Debug, Clone)]
 pub struct ScanSurface {
     map: CubeMap,
@@ -152,8 +152,8 @@ impl ScanSurface {
         rims.into_iter().for_each(|i| self.hits[i].is_rim = true);
     }
 
-    /// True where two points beside each other can lie on one surface that is not seen at a smaller angle than the grazing
-    /// one.
+    /// True where two points beside each other can lie on one surface that is not seen at a smaller angle than the
+    /// grazing one.
     fn are_joined(&self, a: &Hit, b: &Hit) -> bool {
         let (near, far) = if a.distance_m <= b.distance_m { (a, b) } else { (b, a) };
         let scale = near.distance_m / far.distance_m;
@@ -164,8 +164,8 @@ impl ScanSurface {
             && distance(near.offset, far.offset) <= SAMPLES_MAX * spacing_m
     }
 
-    /// The ends of the directions that were seen, or where they are `range_m` from the sensor if that is nearer: offsets in
-    /// the sensor frame, meters.
+    /// The ends of the directions that were seen, or where they are `range_m` from the sensor if that is nearer:
+    /// offsets in the sensor frame, meters.
     pub fn seen(&self, range_m: f32) -> impl Iterator<Item = [f32; 3]> {
         self.hits.iter().map(move |hit| {
             let share = (range_m / hit.distance_m).min(1.0);
@@ -173,8 +173,8 @@ impl ScanSurface {
         })
     }
 
-    /// Calls `f` with samples of the surface (sensor frame, meters) within `range_m`, of which two beside each other are no
-    /// farther apart than the settings say, but for the points of the scan itself.
+    /// Calls `f` with samples of the surface (sensor frame, meters) within `range_m`, of which two beside each other
+    /// are no farther apart than the settings say, but for the points of the scan itself.
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
         for pixel in self.map.all_pixels() {
             let is_surface = |hit: &&Hit| !hit.is_open && hit.distance_m <= range_m;
@@ -229,15 +229,16 @@ impl ScanSurface {
 
     /// True where the direction of `offset` (sensor frame) was seen to end more than `margin_m` beyond it.
     #[inline]
-    pub fn sees_beyond(&self, offset: [f32; 3], margin_m: f32) -> bool {
+    pub fn depth_exceeds(&self, offset: [f32; 3], margin_m: f32) -> bool {
         let seen = self.map.project(offset).and_then(|seen| self.hit((seen.face, seen.pixel)));
         seen.is_some_and(|hit| hit.distance_m > norm(offset) + margin_m)
     }
 
-    /// True where the scan saw through a ball of `radius_m` around `offset` (sensor frame): each direction in which the ball
-    /// lies ends beyond it, and no direction within a pixel of these is unseen, or ends before that at a rim.
+    /// True where the scan saw through a ball of `radius_m` around `offset` (sensor frame): each direction in which the
+    /// ball lies ends beyond it, and no direction within a pixel of these is unseen, or ends before that at a rim.
     ///
-    /// Nothing is seen through where rays ran farther from each other than `gap_max_m`: what is larger than that was met by one.
+    /// Nothing is seen through where rays ran farther from each other than `gap_max_m`: what is larger than that was
+    /// met by one.
     pub fn sees_through(&self, offset: [f32; 3], radius_m: f32, gap_max_m: f32) -> bool {
         let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
         let (distance_m, pixel_m) = (norm(offset), depth_m * self.map.pitch());
@@ -288,8 +289,8 @@ mod tests {
 
     const SETTINGS: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0.1, spacing_m: 0.2 };
 
-    /// Rays half a degree apart about the x axis that end so far away as `end_m` says of their angles to the side and up, degrees; with
-    /// those that it says nothing of.
+    /// Rays half a degree apart about the x axis that end so far away as `end_m` says of their angles to the side and
+    /// up, degrees; with those that it says nothing of.
     fn rays(end_m: impl Fn(f32, f32) -> Option<f32>) -> [Vec<Point>; 2] {
         let mut rays = [Vec::new(), Vec::new()];
         for i in 0..120 * 80 {

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::range_image::WellBeyond;
-use super::reach::{ReachIndex, Slot};
+use super::coverage::{CoverageIndex, Slot};
+use super::range_image::AbsenceEvidence;
 use super::viewpoint::Viewpoint;
 use crate::geometry::{Pose, pose_difference};
 use crate::util::Digest;
 
-/// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
+/// The viewpoints of a map, by the revisions of the scans that left them, with an index of what each covers.
 #[derive(Clone, Default)]
 pub struct ViewpointSet {
     slots: Vec<Option<(u64, Arc<Viewpoint>)>>,
@@ -17,7 +17,7 @@ pub struct ViewpointSet {
     places_m: Vec<[f32; 3]>,
     by_revision: BTreeMap<u64, Slot>,
     unused: Vec<Slot>,
-    index: ReachIndex,
+    index: CoverageIndex,
     bytes: usize,
     stored_bytes: usize,
     /// The sum of the hashes of the viewpoints, each with its revision, modulo 2^64.
@@ -36,7 +36,7 @@ impl ViewpointSet {
             self.places_m.push([0.0; 3]);
             (self.slots.len() - 1) as Slot
         });
-        self.index.insert(slot, viewpoint.reach());
+        self.index.insert(slot, viewpoint.coverage());
         self.by_revision.insert(revision, slot);
         self.bytes += viewpoint.memory_bytes();
         self.stored_bytes += viewpoint.image().stored_bytes();
@@ -50,7 +50,7 @@ impl ViewpointSet {
     pub fn remove(&mut self, revision: u64) -> Option<Arc<Viewpoint>> {
         let slot = self.by_revision.remove(&revision)?;
         let (_, viewpoint) = self.slots[slot as usize].take()?;
-        self.index.remove(slot, viewpoint.reach());
+        self.index.remove(slot, viewpoint.coverage());
         self.unused.push(slot);
         self.bytes -= viewpoint.memory_bytes();
         self.stored_bytes -= viewpoint.image().stored_bytes();
@@ -98,18 +98,19 @@ impl ViewpointSet {
         self.hash
     }
 
-    /// True where one of the viewpoints saw beyond `point_m` (map frame, meters).
-    pub fn sees_through(&self, point_m: [f64; 3]) -> bool {
+    /// True where one of the viewpoints proves `point_m` (map frame, meters) to be free.
+    pub fn is_free(&self, point_m: [f64; 3]) -> bool {
         self.observer(point_m).is_some()
     }
 
-    /// The parts of space that a viewpoint may have seen a point of, each once: boxes of the map frame, as the smallest and the largest
-    /// coordinates, meters. Boxes of viewpoints that reach further are larger, and may hold others.
+    /// The parts of space that a viewpoint may have seen a point of, each once: boxes of the map frame, as the smallest
+    /// and the largest coordinates, meters. Boxes of viewpoints that reach further are larger, and may hold others.
     pub fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.index.boxes_m()
     }
 
-    /// The viewpoints that may have seen beyond a point between two corners (map frame, meters), first those that saw most there.
+    /// The viewpoints that may have seen beyond a point between two corners (map frame, meters), first those that saw
+    /// most there.
     ///
     /// Takes longer the further apart the corners are, against how far viewpoints see.
     pub fn within(&self, low_m: [f64; 3], high_m: [f64; 3]) -> impl Iterator<Item = &Viewpoint> {
@@ -117,39 +118,41 @@ impl ViewpointSet {
     }
 
     /// Looks at many points that lie near each other, one after the other.
-    pub fn gaze(&self) -> Gaze<'_> {
-        Gaze { set: self, last: None }
+    pub fn cache(&self) -> ViewpointCache<'_> {
+        ViewpointCache { set: self, last: None }
     }
 
     /// True where a viewpoint may have looked into a box of the map: the smallest and the largest coordinates, meters.
-    pub fn may_look_into(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
-        self.index.may_look_into(low_m, high_m)
+    pub fn may_cover(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
+        self.index.may_cover(low_m, high_m)
     }
 
     /// True where one of the viewpoints but that of `revision` saw beyond `point_m`.
-    pub fn others_see_through(&self, point_m: [f64; 3], revision: u64) -> bool {
+    pub fn is_free_by_others(&self, point_m: [f64; 3], revision: u64) -> bool {
         let own = self.by_revision.get(&revision);
         let others = self.index.around(point_m).filter(|slot| Some(slot) != own);
-        others.filter_map(|slot| self.at(slot)).any(|viewpoint| viewpoint.sees_through(point_m))
+        others.filter_map(|slot| self.at(slot)).any(|viewpoint| viewpoint.is_free(point_m))
     }
 
-    /// True where a viewpoint of a scan after `revision` saw well beyond `point_m`, see [`RangeImage::sees_well_beyond`].
+    /// True where a viewpoint of a scan after `revision` proves that nothing is at `point_m`, see
+    /// [`RangeImage::proves_absent`].
     ///
-    /// [`RangeImage::sees_well_beyond`]: super::RangeImage::sees_well_beyond
-    pub fn since_saw_well_beyond(&self, point_m: [f64; 3], least: WellBeyond, revision: u64) -> bool {
+    /// [`RangeImage::proves_absent`]: super::RangeImage::proves_absent
+    pub fn later_proves_absent(&self, point_m: [f64; 3], least: AbsenceEvidence, revision: u64) -> bool {
         let candidates =
             self.index.around(point_m).filter_map(|slot| self.slots.get(slot as usize)?.as_ref());
         candidates
             .filter(|(made, _)| *made > revision)
-            .any(|(_, viewpoint)| viewpoint.image().sees_well_beyond(viewpoint.offset(point_m), least))
+            .any(|(_, viewpoint)| viewpoint.image().proves_absent(viewpoint.offset(point_m), least))
     }
 
-    /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg` against it.
+    /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg`
+    /// against it.
     pub fn any_near(&self, map_from_sensor: &Pose, distance_m: f64, rotation_deg: f64) -> bool {
         let place = map_from_sensor.translation.vector;
         let near = self.places_m.iter().zip(&self.slots).filter(|(viewpoint_m, _)| {
             let squared: f64 = (0..3).map(|axis| (f64::from(viewpoint_m[axis]) - place[axis]).powi(2)).sum();
-            // f32 places find out who may be near; what decides is the pose.
+            // f32 places find which viewpoints may be near; what decides is the pose.
             squared.sqrt() <= distance_m + PLACE_ERROR_M
         });
         near.filter_map(|(_, viewpoint)| viewpoint.as_ref()).any(|(_, viewpoint)| {
@@ -160,7 +163,7 @@ impl ViewpointSet {
 
     fn observer(&self, point_m: [f64; 3]) -> Option<&Viewpoint> {
         let mut candidates = self.index.around(point_m).filter_map(|slot| self.at(slot));
-        candidates.find(|viewpoint| viewpoint.sees_through(point_m)).map(Arc::as_ref)
+        candidates.find(|viewpoint| viewpoint.is_free(point_m)).map(Arc::as_ref)
     }
 
     fn at(&self, slot: Slot) -> Option<&Arc<Viewpoint>> {
@@ -190,18 +193,18 @@ impl Extend<(u64, Arc<Viewpoint>)> for ViewpointSet {
     }
 }
 
-/// A look at points one after the other, which asks first who saw through the point before.
+/// A cache for points that are asked one after the other: the viewpoint that proved the last one free is asked first.
 #[derive(Debug, Clone)]
-pub struct Gaze<'a> {
+pub struct ViewpointCache<'a> {
     set: &'a ViewpointSet,
     last: Option<&'a Viewpoint>,
 }
 
-impl Gaze<'_> {
-    /// [`ViewpointSet::sees_through`].
+impl ViewpointCache<'_> {
+    /// [`ViewpointSet::is_free`].
     #[inline]
-    pub fn sees_through(&mut self, point_m: [f64; 3]) -> bool {
-        if self.last.is_some_and(|viewpoint| viewpoint.sees_through(point_m)) {
+    pub fn is_free(&mut self, point_m: [f64; 3]) -> bool {
+        if self.last.is_some_and(|viewpoint| viewpoint.is_free(point_m)) {
             return true;
         }
         let observer = self.set.observer(point_m);

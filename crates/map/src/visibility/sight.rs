@@ -15,11 +15,12 @@ pub enum Sight {
     NotSeen,
 }
 
-/// Pixels on each side of a point's own in which it is looked for: what was met lies up to a pixel beside where it is seen.
+/// Pixels on each side of a point's own in which it is looked for: what was met lies up to a pixel beside where it is
+/// seen.
 const BESIDE: isize = 1;
 
-/// The sight of the point at `offset` from the sensor, in its frame, by an image whose pixels were seen to the depths that
-/// `depth_m` tells. Depths that differ by `tolerance_m` or less are the same.
+/// The sight of the point at `offset` from the sensor, in its frame, by an image whose pixels were seen to the depths
+/// that `depth_m` tells. Depths that differ by `tolerance_m` or less are the same.
 #[inline(always)]
 pub(super) fn sight(
     map: CubeMap,

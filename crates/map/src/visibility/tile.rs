@@ -4,8 +4,8 @@ use super::cube_map::TILE_SIDE;
 
 /// Pixels of a tile.
 pub(super) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
-/// Bits of a pixel when it is stored. Eight would tell depths better, but of fewer pixels: coarser ones tell less of a scan all around
-/// than the rounding takes.
+/// Bits of a pixel when it is stored. Eight would tell depths better, but of fewer pixels: coarser ones tell less of a
+/// scan all around than the rounding takes.
 const PIXEL_BITS: usize = 6;
 /// Bytes of a tile when it is stored.
 pub(super) const TILE_BYTES: usize = 4 + TILE_PIXELS * PIXEL_BITS / 8;
@@ -22,10 +22,11 @@ const GAP_UNIT: f32 = 0.0045;
 const PACKED_PIXELS: usize = 4;
 const PACKED_BYTES: usize = PACKED_PIXELS * PIXEL_BITS / 8;
 
-/// Depths of the pixels of a tile, in the image's unit: pixel i was seen up to `base + step * (seen[i] - 1)`, or not at all where
-/// `seen[i]` is 0.
+/// Depths of the pixels of a tile, in the image's unit: pixel i was seen up to `base + step * (seen[i] - 1)`, or not at
+/// all where `seen[i]` is 0.
 ///
-/// Depths beside each other are alike, so that little is lost where they are rounded down: no more is said to be seen than was.
+/// Depths beside each other are alike, so that little is lost where they are rounded down: no more is said to be seen
+/// than was.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Tile {
     base: u16,

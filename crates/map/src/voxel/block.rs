@@ -215,7 +215,8 @@ impl BlockMask {
         })
     }
 
-    /// The occupied voxels at `level` (0, 1 or 2) as the cells of a block of as many fewer levels: the first 512, 64 or 8.
+    /// The occupied voxels at `level` (0, 1 or 2) as the cells of a block of as many fewer levels: the first 512, 64 or
+    /// 8.
     #[inline]
     pub(super) fn coarsened(&self, level: u32) -> Self {
         match level {

@@ -118,9 +118,9 @@ impl Cluster {
         }
     }
 
-    /// How large the empty aligned cube around `cell` of the block at `place` is: the levels, 0 to 5, from a cell up to it,
-    /// which then is a block at 3 and the cluster at 5. None where the ancestor of `cell`, `level` (0, 1 or 2) levels up, is
-    /// occupied.
+    /// How large the empty aligned cube around `cell` of the block at `place` is: the levels, 0 to 5, from a cell up to
+    /// it, which then is a block at 3 and the cluster at 5. None where the ancestor of `cell`, `level` (0, 1 or 2)
+    /// levels up, is occupied.
     #[inline(always)]
     pub(crate) fn empty_levels(&self, place: BlockInCluster, cell: Cell, level: u32) -> Option<u32> {
         let octant = Self::OCTANT << (place.0 & Self::OCTANT_FIRST);

@@ -5,9 +5,9 @@ use super::cluster::Cluster;
 use super::key::VoxelKey;
 use super::slots::{BUCKET, Bucket, Slots, Tags, VACANT, VACANT_BUCKET};
 
-/// Slots for each cluster, at least. At 3 one bucket in 150 is full (a Poisson tail), so that nearly every search ends in
-/// the bucket where it began; a wide look-up leaves its way if one of eight does not. At 2 it was one in twenty, and small
-/// maps took an eighth to a third longer at random.
+/// Slots for each cluster, at least. At 3 one bucket in 150 is full (a Poisson tail), so that nearly every search ends
+/// in the bucket where it began; a wide look-up leaves its way if one of eight does not. At 2 it was one in twenty, and
+/// small maps took an eighth to a third longer at random.
 const SLOTS_A_CLUSTER: usize = 3;
 
 /// Blocks by key, by way of their clusters, which are in buckets of eight.
@@ -18,8 +18,8 @@ const SLOTS_A_CLUSTER: usize = 3;
 /// clusters  [ 8 x 32 bytes | ... ]         the cluster of keys[b][i] is clusters[8 b + i]; its masks are elsewhere
 /// ```
 ///
-/// There is a cluster for some fifteen blocks, or a thousand voxels, of a surface: so all of this but the masks fits in the
-/// caches, and a block costs a look-up one miss.
+/// There is a cluster for some fifteen blocks, or a thousand voxels, of a surface: so all of this but the masks fits in
+/// the caches, and a block costs a look-up one miss.
 ///
 /// A key lives in its home bucket or, where that is full, in the next one that is not. A bucket's vacant slots
 /// come last, so that its last key tells whether a search has to go on; removal pulls keys back instead of
@@ -37,8 +37,8 @@ pub struct ClusterTable {
 }
 
 impl Default for ClusterTable {
-    /// A table without a block. It has a bucket, so that a search has where to begin, and no clusters: they come with the
-    /// first key.
+    /// A table without a block. It has a bucket, so that a search has where to begin, and no clusters: they come with
+    /// the first key.
     fn default() -> Self {
         Self {
             tags: vec![0; 1],

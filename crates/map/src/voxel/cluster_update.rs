@@ -6,7 +6,7 @@ use super::block::BlockMask;
 use super::cluster::{BlockInCluster, Cluster};
 use super::cluster_table::ClusterTable;
 use super::key::VoxelKey;
-use super::set::BLOCKS_PER_LOOK;
+use super::set::BLOCKS_PER_STOP_CHECK;
 use crate::util::StopSignal;
 
 /// Clusters as a change leaves them, made beside those that they are to replace: so readers go on meanwhile, and are
@@ -21,7 +21,7 @@ impl ClusterUpdate {
     pub(crate) fn plan(table: &ClusterTable, blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Self {
         let mut touched = Touched::default();
         let mut numbers = Vec::with_capacity(blocks.len());
-        for (block, mask) in stop.pieces(blocks, BLOCKS_PER_LOOK).flatten() {
+        for (block, mask) in stop.pieces(blocks, BLOCKS_PER_STOP_CHECK).flatten() {
             let (key, place) = BlockInCluster::of(*block);
             let number = touched.number(table, key);
             let present = &mut touched.clusters[number].present;
@@ -29,13 +29,13 @@ impl ClusterUpdate {
             numbers.push(number);
         }
         let mut clusters = Vec::with_capacity(touched.clusters.len());
-        for touched in stop.pieces(&touched.clusters, BLOCKS_PER_LOOK) {
+        for touched in stop.pieces(&touched.clusters, BLOCKS_PER_STOP_CHECK) {
             clusters.extend(touched.iter().map(TouchedCluster::renewed));
         }
         if stop.is_stopped() {
             return Self(clusters);
         }
-        let new = stop.paced(blocks.iter().zip(numbers), BLOCKS_PER_LOOK);
+        let new = stop.paced(blocks.iter().zip(numbers), BLOCKS_PER_STOP_CHECK);
         for ((block, mask), number) in new.filter(|((_, mask), _)| !mask.is_empty()) {
             clusters[number].1.set(BlockInCluster::of(*block).1, *mask);
         }

@@ -25,6 +25,6 @@ pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESO
 pub use moment_set::MomentSet;
 pub use moments::{MOMENT_LEVEL, Moments};
 pub use sample::{VolumetricSample, sample_bytes_max, volumetric_sample, volumetric_sample_until};
-pub use set::BLOCKS_PER_LOOK;
+pub use set::BLOCKS_PER_STOP_CHECK;
 pub use set::VoxelSet;
 pub(crate) use slots::{BUCKET, Bucket, Slots};

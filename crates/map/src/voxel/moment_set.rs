@@ -5,7 +5,7 @@ use hashbrown::HashMap;
 use super::key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 use super::lattice::LatticeFromPoints;
 use super::moments::{MOMENT_LEVEL, Moments};
-use super::set::{BLOCKS_PER_LOOK, VoxelSet};
+use super::set::{BLOCKS_PER_STOP_CHECK, VoxelSet};
 use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
 
@@ -49,7 +49,7 @@ impl MomentSet {
 
     /// [`MomentSet::of_centers`] under a stop signal; once stopped, some of them.
     pub fn of_centers_until(voxels: &VoxelSet, stop: StopSignal<'_>) -> Self {
-        let blocks = stop.pieces(voxels.blocks(), BLOCKS_PER_LOOK).flatten();
+        let blocks = stop.pieces(voxels.blocks(), BLOCKS_PER_STOP_CHECK).flatten();
         Self::of_voxels_until(blocks.flat_map(|(block, mask)| mask.moments(*block)).collect(), stop)
     }
 

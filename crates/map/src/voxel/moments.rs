@@ -8,9 +8,9 @@ pub const MOMENT_LEVEL: u32 = 2;
 
 /// How far points lie from the center of their voxel, summed: count, sum d and sum d d^T.
 ///
-/// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, of points multiples of [`Moments::STEP`], so
-/// that sums neither round nor depend on their order: every thread count gives the same map, and a map without a scan is
-/// that of the others.
+/// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, of points multiples of [`Moments::STEP`],
+/// so that sums neither round nor depend on their order: every thread count gives the same map, and a map without a
+/// scan is that of the others.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments([i64; Moments::NUMBERS]);
 

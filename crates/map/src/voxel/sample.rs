@@ -22,7 +22,7 @@ const TRIALS: usize = 16;
 /// The first of them, meters.
 const FIRST_M: f64 = 0.25;
 /// Points that are looked at between two looks at the stop signal: a millisecond or less.
-const POINTS_PER_LOOK: usize = 16 << 10;
+const POINTS_PER_STOP_CHECK: usize = 16 << 10;
 /// Times the wish that no sample exceeds. Points that are each alone in the coarsest voxel, as no scan's are, would
 /// otherwise all be taken.
 const WISHES_MAX: usize = 4;
@@ -101,7 +101,7 @@ fn one_of_each_voxel(
     let per_resolution = (1.0 / resolution_m) as f32;
     let mut chosen = HashMap::with_capacity(points.len() / 16);
     for (place, point) in points.iter().enumerate() {
-        if place.is_multiple_of(POINTS_PER_LOOK) && stop.is_stopped() {
+        if place.is_multiple_of(POINTS_PER_STOP_CHECK) && stop.is_stopped() {
             return None;
         }
         // Unlike a map's lattice this one need not be exact at its borders or reach far: it saturates.
@@ -185,7 +185,7 @@ mod tests {
             let count = || looks.replace(looks.get() + 1) == usize::MAX;
             let points = wall().repeat(scans);
             volumetric_sample_until(&points, 500, 1, StopSignal::when(&count));
-            assert!(looks.get() >= points.len() / POINTS_PER_LOOK, "{} looks", looks.get());
+            assert!(looks.get() >= points.len() / POINTS_PER_STOP_CHECK, "{} looks", looks.get());
         }
     }
 

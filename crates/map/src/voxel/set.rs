@@ -10,7 +10,7 @@ use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_giving_way, sort_by_key_until};
 
 /// Blocks that are worked on between two looks at the stop signal: some milliseconds.
-pub const BLOCKS_PER_LOOK: usize = 16 << 10;
+pub const BLOCKS_PER_STOP_CHECK: usize = 16 << 10;
 
 /// Distinct finest voxels, as blocks in ascending order of their keys; no block is empty.
 ///
@@ -105,8 +105,8 @@ impl VoxelSet {
         self.blocks.iter().flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))
     }
 
-    /// The voxels of [`MOMENT_LEVEL`] that hold one of these, ascending: those with moments of points, where every voxel
-    /// has a point.
+    /// The voxels of [`MOMENT_LEVEL`] that hold one of these, ascending: those with moments of points, where every
+    /// voxel has a point.
     pub fn moment_voxels(&self) -> Vec<VoxelKey> {
         self.moment_voxels_until(StopSignal::NEVER)
     }
@@ -117,7 +117,7 @@ impl VoxelSet {
             let block = *block;
             mask.cells(MOMENT_LEVEL).map(move |cell| cell.voxel(block).ancestor(MOMENT_LEVEL))
         };
-        let blocks = stop.pieces(&self.blocks, BLOCKS_PER_LOOK).flatten();
+        let blocks = stop.pieces(&self.blocks, BLOCKS_PER_STOP_CHECK).flatten();
         let mut voxels: Vec<VoxelKey> = blocks.flat_map(of_block).collect();
         sort_by_key_until(&mut voxels, |voxel| *voxel, stop);
         voxels
@@ -130,7 +130,7 @@ impl VoxelSet {
         Self::of_sorted(blocks)
     }
 
-    /// [`VoxelSet::of_blocks_until`] that lets other work go first between its parts: for who holds no lock.
+    /// [`VoxelSet::of_blocks_until`] that lets other work go first between its parts: for callers that hold no lock.
     pub fn of_blocks_giving_way(mut blocks: Vec<(VoxelKey, BlockMask)>, stop: StopSignal<'_>) -> Self {
         blocks.retain(|(_, mask)| !mask.is_empty());
         sort_by_key_giving_way(&mut blocks, |(key, _)| *key, stop);

@@ -39,7 +39,7 @@ impl MapService {
                 DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
                 DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => {}
             }
-            // Who touched what since is read from the journal, as for an undo.
+            // The scans that touched each voxel since are read from the journal, as for an undo.
             let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
             let lane = if reads_journal { &self.inner.lanes.undo } else { &self.inner.lanes.mapping };
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
@@ -94,7 +94,7 @@ impl HostedMap {
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
-            let lent = budget.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
+            let reserved = budget.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
             let voxels = match unseen {
                 Some(unseen) => unseen.decided(&map, core, stop)?,
                 None => map.targets_of(&deletion, stop)?,
@@ -102,10 +102,10 @@ impl HostedMap {
             if voxels.is_empty() {
                 return Ok(None);
             }
-            drop(lent);
-            let lent = vec![budget.reserve_transient(removal_bytes(core, &voxels), "a deletion")?];
+            drop(reserved);
+            let reserved = vec![budget.reserve_transient(removal_bytes(core, &voxels), "a deletion")?];
             let change = Change::Deletion(DeletionRecord { voxels, request });
-            Ok(Some(Decided { change, record: None, lent, pin: None }))
+            Ok(Some(Decided { change, record: None, reserved, pin: None }))
         };
         let map = Arc::clone(self);
         let answer = move |committed: Committed| DeletionAnswer {

@@ -155,7 +155,7 @@ impl HostedMap {
 
 /// A change of a keep-out as a thread for commits makes it.
 pub(super) fn decided(record: KeepOutRecord) -> Decided {
-    Decided { change: map::Change::KeepOut(record), record: None, lent: Vec::new(), pin: None }
+    Decided { change: map::Change::KeepOut(record), record: None, reserved: Vec::new(), pin: None }
 }
 
 /// Refuses a keep-out that would be over before it began.

@@ -8,11 +8,11 @@ use crate::resources::{Reservation, ResourceBudget};
 use crate::work::{check_not_stopped, ended_early};
 use mrol_map::map::{Change, MultiResolutionMap, WithdrawnChange};
 use mrol_map::util::StopSignal;
-use mrol_map::visibility::WellBeyond;
+use mrol_map::visibility::AbsenceEvidence;
 use mrol_map::voxel::{BlockMask, VoxelKey, VoxelSet};
 use mrol_store::MapFolder;
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const UNSEEN: &str = "a deletion of what was not seen";
 /// How far behind a voxel a scan has to have seen, in finest voxels: noise puts surfaces two voxels off.
 const MARGIN_VOXELS: f32 = 3.0;
@@ -27,7 +27,7 @@ pub(super) struct Unseen {
     revision: u64,
     /// The changes that were taken back then.
     withdrawn: Vec<WithdrawnChange>,
-    _lent: Reservation,
+    _reserved: Reservation,
 }
 
 impl HostedMap {
@@ -58,7 +58,7 @@ impl HostedMap {
             );
             return Err(ServiceError::new(Reason::OutsideUndoWindow, message));
         }
-        let lent = budget.reserve_transient(2 * self.map.set_bytes() as u64, UNSEEN)?;
+        let reserved = budget.reserve_transient(2 * self.map.set_bytes() as u64, UNSEEN)?;
         let long_read = self.map.long_read();
         let view = long_read.view().with_viewpoints();
         let there = view.finest_in_until(&target.region, level, stop);
@@ -68,12 +68,12 @@ impl HostedMap {
         drop(long_read);
         let lattice = self.map.lattice();
         let voxel_m = lattice.resolution_m(0) as f32;
-        let least = WellBeyond { margin_m: MARGIN_VOXELS * voxel_m, gap_max_m: voxel_m };
+        let least = AbsenceEvidence { margin_m: MARGIN_VOXELS * voxel_m, gap_max_m: voxel_m };
         let seen_through = stop.paced(there.blocks(), BLOCKS_PER_STOP_CHECK).map(|(block, mask)| {
             let mut seen_through = BlockMask::EMPTY;
             for cell in mask.cells(0) {
                 let center_m = lattice.center_m(cell.voxel(*block), 0);
-                if viewpoints.since_saw_well_beyond(center_m, least, target.revision) {
+                if viewpoints.later_proves_absent(center_m, least, target.revision) {
                     seen_through.insert(cell);
                 }
             }
@@ -81,7 +81,7 @@ impl HostedMap {
         });
         let voxels = seen_through.collect();
         check_not_stopped(stop)?;
-        let mut unseen = Unseen { voxels, revision: target.revision, withdrawn, _lent: lent };
+        let mut unseen = Unseen { voxels, revision: target.revision, withdrawn, _reserved: reserved };
         unseen.read_to(revision, self, folder, stop)?;
         Ok(unseen)
     }

@@ -20,7 +20,7 @@ use mrol_map::map::{
 use mrol_map::util::StopSignal;
 use mrol_store::{MapFolder, NotObserved, Observed, Record};
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const UNDO: &str = "an undo";
 
 /// An undo as it would be had nothing changed since.
@@ -28,7 +28,7 @@ struct PlannedUndo {
     change: Change,
     record: Record,
     observed: Observed,
-    lent: Vec<Reservation>,
+    reserved: Vec<Reservation>,
 }
 
 impl PlannedUndo {
@@ -40,7 +40,7 @@ impl PlannedUndo {
         folder: &MapFolder,
         stop: StopSignal<'_>,
     ) -> Result<Decided, ServiceError> {
-        let Self { mut change, record, mut observed, lent } = self;
+        let Self { mut change, record, mut observed, reserved } = self;
         folder.observe(&mut observed, stop).map_err(|e| map.unreadable(&e))?;
         check_not_stopped(stop)?;
         let Observed { observations, pin, .. } = observed;
@@ -50,7 +50,7 @@ impl PlannedUndo {
             }
             Change::Insertion(_) | Change::Deletion(_) | Change::KeepOut(_) => false,
         };
-        Ok(Decided { change, record: Some(record).filter(|_| !is_other), lent, pin: Some(pin) })
+        Ok(Decided { change, record: Some(record).filter(|_| !is_other), reserved, pin: Some(pin) })
     }
 }
 
@@ -104,8 +104,8 @@ impl HostedMap {
 
     /// Prepares an undo, unless it was done before.
     ///
-    /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
-    /// nobody else can change the map.
+    /// The owners of the voxels are read from the journal while scans go on coming in; the last of them are looked at
+    /// when nobody else can change the map.
     pub(crate) fn prepare_undo(
         self: &Arc<Self>,
         undo: &Undo,
@@ -179,18 +179,18 @@ impl HostedMap {
         check_not_stopped(stop)?;
         observed.observations.renew(&mut removed, &mut restored, &mut moments);
         let removal = budget.reserve_transient(removal_bytes(&self.map, &removed), UNDO)?;
-        let mut lent = vec![finding_out, removal];
+        let mut reserved = vec![finding_out, removal];
         if !restored.is_empty() {
             let growth = growth_bytes(self.map.settings(), &restored, moments.as_slice().len());
-            lent.push(budget.reserve_growth(growth)?);
+            reserved.push(budget.reserve_growth(growth)?);
         }
         (targets.removed, targets.restored, targets.moments) = (removed, restored, moments);
         let change = Change::Undo(targets);
         let record = record_of(&change)?;
-        Ok(PlannedUndo { change, record, observed, lent })
+        Ok(PlannedUndo { change, record, observed, reserved })
     }
 
-    /// What the map holds without `changes`. Memory is lent for each part before it is built.
+    /// What the map holds without `changes`. Memory is reserved for each part before it is built.
     fn observe(
         &self,
         folder: &MapFolder,
@@ -199,7 +199,7 @@ impl HostedMap {
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Observed, ServiceError> {
-        // What was lent before lies in memory by the time more is asked for, and is measured there.
+        // What was reserved before lies in memory by the time more is asked for, and is measured there.
         let mut part = None;
         let reserve = |bytes| {
             drop(part.take());

@@ -138,8 +138,8 @@ impl CommitQueue {
         outcome
     }
 
-    /// Takes nothing any more; the receiver hears when the changes that wait are made and synced, and the map's folder is
-    /// not used any more.
+    /// Takes nothing any more; the receiver hears when the changes that wait are made and synced, and the map's folder
+    /// is not used any more.
     pub(crate) fn close(self) -> oneshot::Receiver<()> {
         let (at_work, done) = oneshot::channel();
         self.inbox.state.lock().at_work = Some(at_work);
@@ -172,7 +172,8 @@ impl CommitQueue {
     pub(crate) fn end_replaced(&self) {
         self.stopped.get_or_init(|| Stop::Replaced);
         let nothing = Submission::Undecided(Box::new(|_, _| Ok(None)));
-        // What is still to have its turn is refused from now on. It takes no place; where the worker is gone, so are its changes.
+        // What is still to have its turn is refused from now on. It takes no place; where the worker is gone, so are
+        // its changes.
         let requester = Requester::from(&Asker::default());
         drop(self.put(&requester, nothing, None).blocking_recv());
         self.ended.send_replace(true);

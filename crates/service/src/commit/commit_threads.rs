@@ -1,7 +1,8 @@
 //! The threads that commit: as many as the machine has use for, however many maps there are.
 //!
-//! A map that has something to commit waits in a row for a thread, takes one for a group of changes, and goes to the end of
-//! the row where more has come meanwhile. So the changes of one map stay in order, and no map keeps the others waiting.
+//! A map that has something to commit waits in a row for a thread, takes one for a group of changes, and goes to the
+//! end of the row where more has come meanwhile. So the changes of one map stay in order, and no map keeps the others
+//! waiting.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
@@ -29,7 +30,8 @@ pub(super) trait Turn: Send + Sync {
     fn wake(self: Arc<Self>, threads: &CommitThreads);
 }
 
-/// The threads that commit the changes of all maps. The last map that is dropped, or this where there is none, ends them.
+/// The threads that commit the changes of all maps. The last map that is dropped, or this where there is none, ends
+/// them.
 #[derive(Debug)]
 pub(crate) struct CommitThreads(Arc<Shared>);
 

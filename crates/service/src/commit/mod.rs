@@ -13,10 +13,9 @@
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
 //! before it is applied and nothing after it has begun.
 //!
-//! A [`Submission`] goes into the [`CommitQueue`] of its map, where `turns` orders it; one of the [`CommitThreads`], which all
-//! maps share, takes it out, and the map's `worker` journals it, applies it and
-//! publishes it to [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn
-//! comes.
+//! A [`Submission`] goes into the [`CommitQueue`] of its map, where `turns` orders it; one of the [`CommitThreads`],
+//! which all maps share, takes it out, and the map's `worker` journals it, applies it and publishes it to
+//! [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn comes.
 
 mod commit_queue;
 mod commit_threads;

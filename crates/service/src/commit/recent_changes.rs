@@ -1,4 +1,4 @@
-//! The last changes of a map, kept in memory for who watches it.
+//! The last changes of a map, kept in memory for its watchers.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -80,7 +80,7 @@ impl RecentChanges {
     }
 
     /// Says that all changes up to `revision` are durable.
-    pub(super) fn tell_durable(&self, revision: u64) {
+    pub(super) fn note_durable(&self, revision: u64) {
         self.durable.send_if_modified(|durable| {
             let is_newer = revision > *durable;
             *durable = revision.max(*durable);
@@ -111,7 +111,7 @@ impl RecentChanges {
         ring.changes.get(at).cloned()
     }
 
-    /// True where who was told of `revision` can be told of what came after it in this form.
+    /// True where a watcher at `revision` can be told of what came after it in this form.
     pub(crate) fn can_follow(&self, revision: u64, form: WatchForm) -> bool {
         let head = self.ring.lock().head;
         revision == head || self.get(revision + 1).is_some_and(|change| change.has(form))

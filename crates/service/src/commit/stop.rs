@@ -16,7 +16,7 @@ pub(crate) enum Stop {
 }
 
 impl Stop {
-    /// What to say to who wants to change the map.
+    /// The error for requests that would change the map.
     pub(crate) fn refusal(&self, name: &MapName) -> ServiceError {
         match self {
             Self::Failed(reason) => {

@@ -25,7 +25,7 @@ pub(crate) struct Decided {
     /// Where it was made before.
     pub(crate) record: Option<Record>,
     /// The memory that it takes.
-    pub(crate) lent: Vec<Reservation>,
+    pub(crate) reserved: Vec<Reservation>,
     /// Keeps what it was made of until it is visible.
     pub(crate) pin: Option<Pin>,
 }
@@ -77,7 +77,7 @@ pub(crate) enum Step<A> {
     Ready(Submission, Box<dyn FnOnce(Committed) -> A + Send>),
 }
 
-/// A submission with the one who waits for it.
+/// A submission and its waiter.
 pub(super) struct Waiting {
     pub(super) submission: Submission,
     pub(super) answer: oneshot::Sender<Outcome>,

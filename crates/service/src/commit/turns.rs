@@ -6,14 +6,14 @@ use super::submission::{Submission, Waiting};
 use crate::work::{Asker, Row, TURN};
 use mrol_map::map::RobotName;
 
-/// Finest voxels of all changes of a group, at most where it has more than one: what is made in about a tenth of a second,
-/// for which one sync more is nothing.
+/// Finest voxels of all changes of a group, at most where it has more than one: what is made in about a tenth of a
+/// second, for which one sync more is nothing.
 const GROUP_VOXELS_MAX: usize = 500_000;
 /// A change of as many voxels is charged twice what the smallest is.
 const LARGE_CHANGE_VOXELS: usize = 100_000;
 
-/// Changes that wait. Askers take turns, and the robots of an asker among themselves; changes of one robot, and those of
-/// one asker that are of no robot, are made in the order in which they came.
+/// Changes that wait. Askers take turns, and the robots of an asker among themselves; changes of one robot, and those
+/// of one asker that are of no robot, are made in the order in which they came.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     askers: Row<Asker, Row<Option<RobotName>, VecDeque<Waiting>>>,

@@ -40,7 +40,7 @@ pub(crate) struct WatchedChange {
 struct ToldViewpoint {
     map_from_sensor: Pose,
     of_record: ViewpointRecord,
-    /// As it is told, made once for all who are told of it.
+    /// As it is told, made once for all watchers.
     told: OnceLock<LeftViewpoint>,
 }
 
@@ -49,7 +49,7 @@ struct ToldViewpoint {
 struct Exchanged {
     removed: VoxelSet,
     added: VoxelSet,
-    /// Both as they are sent, made once for all who are told of the whole.
+    /// Both as they are sent, made once for all watchers of the whole map.
     bytes: OnceLock<[BlockBytes; 2]>,
 }
 
@@ -130,7 +130,7 @@ impl WatchedChange {
         }
     }
 
-    /// What there is to tell of it to who asked for this; none where it cannot be told in its form.
+    /// The message for a watcher that asked for this; none where it cannot be told in its form.
     pub(crate) fn parts(&self, watched: &Watched, lattice: &Lattice) -> Option<ChangeParts> {
         let Watched { form, region, viewpoints } = watched;
         let (level, all) = self.of_form(*form)?;
@@ -152,7 +152,7 @@ impl ToldViewpoint {
         Self { map_from_sensor, of_record, told: OnceLock::new() }
     }
 
-    /// What is told of it to who watches `region`, or everything.
+    /// The message for watchers of `region`, or of everything.
     fn told_of(&self, region: Option<&Region>) -> LeftViewpoint {
         let told = self.told.get_or_init(|| LeftViewpoint {
             image: self.of_record.image.to_bytes().into(),

@@ -46,7 +46,7 @@ pub(super) struct Worker {
     thinned: u64,
 }
 
-/// A change to be made, with its record and the one who waits.
+/// A change to be made, with its record and its waiter.
 struct Pending {
     change: Change,
     record: Option<Record>,
@@ -125,12 +125,12 @@ impl Worker {
         let unchanged = Committed::none(self.map.content_version());
         let caller_gone = || answer.is_closed();
         let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
-            Some(Decided { change, record, lent, pin }) => {
+            Some(Decided { change, record, reserved, pin }) => {
                 let record = match (record, &self.folder) {
                     (None, Some(_)) => Some(record_of(&change)?),
                     (record, _) => record,
                 };
-                Ok(Some((change, record, lent, pin)))
+                Ok(Some((change, record, reserved, pin)))
             }
             None => Ok(None),
         };
@@ -173,15 +173,15 @@ impl Worker {
             let change = WatchedChange::of(committed.revision, Some(committed.hash), change, levels);
             recent.push(change, self.map.state_hash());
         }
-        self.tell_durable();
+        self.note_durable();
         self.thin_in_memory();
     }
 
-    /// Tells who watches the map how far it is durable.
-    fn tell_durable(&self) {
+    /// Tells the map's watchers how far it is durable.
+    fn note_durable(&self) {
         let visible = self.map.revision();
         let durable = self.folder.as_ref().map_or(visible, |folder| folder.used().durable.min(visible));
-        self.published.recent.tell_durable(durable);
+        self.published.recent.note_durable(durable);
     }
 
     /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo
@@ -259,7 +259,7 @@ impl Worker {
         {
             self.stop(&error);
         }
-        self.tell_durable();
+        self.note_durable();
     }
 }
 

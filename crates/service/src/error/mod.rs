@@ -5,5 +5,5 @@ mod reason;
 mod service_error;
 
 pub use code::ErrorCode;
-pub use reason::{Reason, ToldBy};
+pub use reason::{Reason, ReportedBy};
 pub use service_error::ServiceError;

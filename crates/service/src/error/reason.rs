@@ -6,7 +6,7 @@ use super::code::ErrorCode;
 
 /// Where a reason is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ToldBy {
+pub enum ReportedBy {
     /// By both protocols.
     Both,
     /// By HTTP alone.
@@ -20,7 +20,7 @@ pub enum ToldBy {
 struct Row {
     word: &'static str,
     code: ErrorCode,
-    told_by: ToldBy,
+    reported_by: ReportedBy,
     http_status: Option<u16>,
     meaning: &'static str,
     remedy: &'static str,
@@ -30,7 +30,7 @@ struct Row {
 /// of the code is not precise, the meaning, and what to do.
 macro_rules! reasons {
     ($($code:ident {
-        $($name:ident $word:literal $told_by:ident $($status:literal)?: $meaning:literal, $remedy:literal;)+
+        $($name:ident $word:literal $reported_by:ident $($status:literal)?: $meaning:literal, $remedy:literal;)+
     })+) => {
         /// Why a request failed: a stable word for programs.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ macro_rules! reasons {
                     $($(Self::$name => Row {
                         word: $word,
                         code: ErrorCode::$code,
-                        told_by: ToldBy::$told_by,
+                        reported_by: ReportedBy::$reported_by,
                         http_status: [$($status)?].first().copied(),
                         meaning: $meaning,
                         remedy: $remedy,
@@ -232,8 +232,8 @@ impl Reason {
     }
 
     /// Where it is told.
-    pub fn told_by(self) -> ToldBy {
-        self.row().told_by
+    pub fn reported_by(self) -> ReportedBy {
+        self.row().reported_by
     }
 
     /// What has happened, in a few words of Markdown.
@@ -273,11 +273,11 @@ mod tests {
                 write!(text, "\n**`{}`**\n\n{head}\n", reason.code().as_str()).unwrap();
             }
             let marks: Vec<String> = [
-                match reason.told_by() {
-                    ToldBy::Both => None,
-                    ToldBy::Http => Some("H".to_owned()),
-                    ToldBy::Grpc => Some("G".to_owned()),
-                    ToldBy::Client => Some("C".to_owned()),
+                match reason.reported_by() {
+                    ReportedBy::Both => None,
+                    ReportedBy::Http => Some("H".to_owned()),
+                    ReportedBy::Grpc => Some("G".to_owned()),
+                    ReportedBy::Client => Some("C".to_owned()),
                 },
                 reason.http_status().map(|status| format!("HTTP {status}")),
             ]

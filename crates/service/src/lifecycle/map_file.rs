@@ -23,7 +23,7 @@ impl HostedMap {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<MapFile, ServiceError> {
-        let _lent = budget.reserve_transient(snapshot_bytes(&self.map), "a map file")?;
+        let _reserved = budget.reserve_transient(snapshot_bytes(&self.map), "a map file")?;
         let ended = || ended_early(stop);
         let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
         let encoded = snapshot.encode_until(stop);

@@ -119,8 +119,8 @@ impl MapService {
         self.inner.catalog.unavailable_within(&self.allowed_maps)
     }
 
-    /// Opens the maps of the data folder side by side, and serves each as soon as it is open; where maps sleep, they fall
-    /// asleep as soon as they have been looked at. Not for an async thread.
+    /// Opens the maps of the data folder side by side, and serves each as soon as it is open; where maps sleep, they
+    /// fall asleep as soon as they have been looked at. Not for an async thread.
     ///
     /// # Errors
     /// Once the progress with which the service was begun is cancelled.
@@ -138,8 +138,8 @@ impl MapService {
         self.inner.catalog.opening()
     }
 
-    /// Saves the maps that nobody has asked for for `sleep_after`, and that nobody uses or watches, and takes them out of
-    /// memory; how many. To be called every now and then.
+    /// Saves the maps that nobody has asked for for `sleep_after`, and that nobody uses or watches, and takes them out
+    /// of memory; how many. To be called every now and then.
     pub async fn put_unused_to_sleep(&self) -> usize {
         let Some(sleep_after) = self.inner.settings.sleep_after else { return 0 };
         let mut asleep = 0;
@@ -262,7 +262,7 @@ impl MapService {
     }
 }
 
-/// Describes a map that was just made, on no lane: who made it is told so, whatever the server has to do besides.
+/// Describes a map that was just made, on no lane: its maker is answered, whatever else the server has to do.
 async fn describe_made(map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
     let described = tokio::task::spawn_blocking(move || map.describe(RATE_SAMPLES, StopSignal::NEVER));
     described.await.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()))

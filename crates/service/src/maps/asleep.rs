@@ -1,11 +1,13 @@
 //! A map that is not in memory: its files have all of it.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 
 use super::robots::Robots;
 use crate::request::MapInfo;
+use crate::work::{Asker, Share, Shares};
 
 /// What is kept of a map that sleeps, or that was not opened yet.
 #[derive(Debug, Default)]
@@ -18,6 +20,10 @@ pub(super) struct Asleep {
     pub(super) folders: Option<Vec<String>>,
     /// Held while it is opened, and while it falls asleep, until its files are closed.
     pub(super) opening: Arc<tokio::sync::Mutex<()>>,
+    /// Since when its files are read.
+    opening_since: Mutex<Option<Instant>>,
+    /// The places of requests that wait for it, among those that wait for any map.
+    waiting: OnceLock<Arc<Shares>>,
 }
 
 impl Asleep {
@@ -29,5 +35,25 @@ impl Asleep {
     /// A map that falls asleep, as it is described.
     pub(super) fn of(info: MapInfo) -> Self {
         Self { info: Some(MapInfo { is_asleep: true, ..info }), ..Self::default() }
+    }
+
+    /// Reads its files, which [`Asleep::is_opened_for`] tells of meanwhile.
+    pub(super) fn open<T>(&self, open: impl FnOnce() -> T) -> T {
+        *self.opening_since.lock() = Some(Instant::now());
+        let opened = open();
+        *self.opening_since.lock() = None;
+        opened
+    }
+
+    /// True of a map whose files are being read for so long and more.
+    pub(super) fn is_opened_for(&self, time: Duration) -> bool {
+        self.opening_since.lock().is_some_and(|since| since.elapsed() >= time)
+    }
+
+    /// A place among those who wait for this map, which are at most half of the `places_of_all` maps: a caller of a map
+    /// whose disk hangs has places left for its other maps. None where there is none left.
+    pub(super) fn wait(&self, asker: &Asker, places_of_all: usize) -> Option<Share> {
+        let places = || Arc::new(Shares::new((places_of_all / 2).max(1)));
+        self.waiting.get_or_init(places).take(asker)
     }
 }

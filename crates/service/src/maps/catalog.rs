@@ -24,7 +24,7 @@ use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::sync::{Rank, RwLock};
 use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
 
-/// How long who makes, replaces or deletes a map waits for the one before: as long as a disk may reasonably take.
+/// How long making, replacing or deleting a map waits for the one before: as long as a disk may reasonably take.
 const TURN_MAX: Duration = Duration::from_secs(10);
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
@@ -219,7 +219,7 @@ impl Catalog {
         }
     }
 
-    /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up who has it.
+    /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up its holder.
     async fn turn_to_write(&self) -> Result<tokio::sync::MutexGuard<'_, ()>, ServiceError> {
         let turn = tokio::time::timeout(TURN_MAX, self.writing.lock()).await;
         turn.map_err(|_| {
@@ -277,7 +277,7 @@ impl Catalog {
         let is_gone = map.folder.as_deref().is_none_or(MapFolder::is_gone);
         if is_gone {
             self.maps.write().open.remove(&map.name);
-            // Who still holds the map may read it, but nothing is kept of it any more.
+            // Requests that still hold the map may read it, but nothing is kept of it any more.
             map.commit_queue.end();
         }
         let version = map.version_now();
@@ -294,9 +294,9 @@ impl Catalog {
         })
     }
 
-    /// Does `save` for each map that `needs` it, `at_once` of them side by side; the number of those for which it says that it wrote
-    /// a snapshot. One that cannot be written keeps none of the others from it. Of thousands of maps few need one, and no thread is
-    /// asked to look at the others.
+    /// Does `save` for each map that `needs` it, `at_once` of them side by side; the number of those for which it says
+    /// that it wrote a snapshot. One that cannot be written keeps none of the others from it. Of thousands of maps few
+    /// need one, and no thread is asked to look at the others.
     pub(crate) async fn save(
         &self,
         at_once: usize,

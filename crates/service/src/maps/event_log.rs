@@ -37,7 +37,7 @@ impl Default for EventLog {
 }
 
 impl EventLog {
-    /// Keeps an event as the newest one, and tells who watches. So many are kept at most, and of as many robots the
+    /// Keeps an event as the newest one, and tells the watchers. So many are kept at most, and of as many robots the
     /// last.
     pub(crate) fn note(&self, mut event: ScanEvent, most: usize) {
         event.time_ns = unix_time_ns();

@@ -14,14 +14,15 @@ use mrol_map::map::ContentHistory;
 pub(crate) struct Followers {
     /// The last revision that was published.
     announced: watch::Receiver<u64>,
-    /// The last changes, for who watches the map.
+    /// The last changes, for the map's watchers.
     pub(crate) recent: Arc<RecentChanges>,
     /// Whole states that watchers are being told of.
     pub(crate) whole_states: FullStates,
 }
 
 impl Followers {
-    /// Those of a map at `revision` with this history, of whose changes so many bytes are kept, and where its thread publishes to them.
+    /// Those of a map at `revision` with this history, of whose changes so many bytes are kept, and where its thread
+    /// publishes to them.
     pub(super) fn new(revision: u64, history: ContentHistory, watch_bytes_max: usize) -> (Self, Published) {
         let (announcing, announced) = watch::channel(revision);
         let recent = Arc::new(RecentChanges::new(revision, history, watch_bytes_max));
@@ -29,7 +30,7 @@ impl Followers {
         (Self { announced, recent, whole_states: FullStates::default() }, published)
     }
 
-    /// Waits until `revision` is there; false where `wait_max` is over first, or the map ends, of which who waits hears
+    /// Waits until `revision` is there; false where `wait_max` is over first, or the map ends, of which waiters hear
     /// at once.
     pub(super) async fn wait_for_revision(
         &self,

@@ -1,4 +1,4 @@
-//! The whole of what a map holds, for who begins to watch it.
+//! The whole of what a map holds, for watches that begin.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Weak};

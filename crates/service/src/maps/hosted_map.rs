@@ -20,7 +20,7 @@ use mrol_map::planning::Planner;
 use mrol_map::util::StopSignal;
 use mrol_store::{FolderUse, MapFolder, OpenedMap, StoreError, StoreSettings};
 
-/// A named map and who waits for it.
+/// A named map and those that wait for it.
 #[derive(Debug)]
 pub(crate) struct HostedMap {
     pub(crate) name: MapName,
@@ -180,7 +180,7 @@ impl HostedMap {
         MapVersion { revision, content_hash, ..now }
     }
 
-    /// Waits until `revision` is there. Who waits hears of the map's end at once.
+    /// Waits until `revision` is there. A waiter hears of the map's end at once.
     pub(crate) async fn wait_for_revision(
         &self,
         revision: u64,

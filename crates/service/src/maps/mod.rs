@@ -1,9 +1,8 @@
 //! The maps by name, and what the service keeps about each.
 //!
 //! A [`Catalog`] has a [`HostedMap`] for each name. What a hosted map is made of stands beside it: `followers`,
-//! `robots`, `snapshots`, `keep_out_expiry`. A map that nobody uses leaves memory (`sleeping`, `asleep`). What is done with a
-//! hosted map is in the rooms above, as further
-//! `impl HostedMap` blocks.
+//! `robots`, `snapshots`, `keep_out_expiry`. A map that nobody uses leaves memory (`sleeping`, `asleep`). What is done
+//! with a hosted map is in the rooms above, as further `impl HostedMap` blocks.
 
 mod asleep;
 mod built_map;

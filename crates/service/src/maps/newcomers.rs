@@ -1,4 +1,4 @@
-//! Who brought which robots into a map: no caller takes all names that a map has room for.
+//! The callers that brought robots into a map: none takes all names that a map has room for.
 
 use std::collections::HashMap;
 

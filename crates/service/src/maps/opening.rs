@@ -13,7 +13,7 @@ use mrol_map::map::MapName;
 use mrol_store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError};
 
 /// Of `requests_max`, the share that may wait for maps that are opened: the rest is left for other maps. One caller may
-/// have half of that wait, which is as many as it may have in work by default.
+/// have half of that wait, a quarter for one map; half is as many as it may have in work by default.
 const WAITING_SHARE: [usize; 2] = [3, 4];
 
 /// Finds the maps of a data folder; none of them is open yet.
@@ -53,7 +53,8 @@ pub(super) fn waiting_within(requests_max: usize) -> Arc<Shares> {
     Arc::new(Shares::new((requests_max.saturating_mul(part) / whole).max(1)))
 }
 
-/// Opens one map, and says what was found of it; `folders` are those that claim to be it, where they were listed before.
+/// Opens one map, and says what was found of it; `folders` are those that claim to be it, where they were listed
+/// before.
 pub(super) fn open_one(
     data_dir: &DataDir,
     name: &MapName,

@@ -25,7 +25,7 @@ pub(crate) struct Robots {
     pub(crate) lost: LostRobots,
     /// What became of the last scans that robots sent.
     pub(crate) events: EventLog,
-    /// Who brought which robots in.
+    /// The callers that brought robots in.
     pub(crate) newcomers: Newcomers,
 }
 

@@ -32,10 +32,11 @@ impl HostedMap {
         let Some(folder) = self.folder.as_ref().filter(|_| self.needs_saving(which)) else {
             return Ok(false);
         };
-        let lent = budget
+        let reserved = budget
             .check_to_shrink()
             .and_then(|()| budget.reserve_transient(snapshot_bytes(&self.map), "a snapshot"));
-        let Ok(_lent) = lent.inspect_err(|no_room| self.snapshots.put_off(&self.name, &no_room.message))
+        let Ok(_reserved) =
+            reserved.inspect_err(|no_room| self.snapshots.put_off(&self.name, &no_room.message))
         else {
             return Ok(false);
         };

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Whoever uses a map holds it, and gets it under the lock of the names. So a map that the names alone hold, under that
-//! lock, is used by nobody, and nobody can begin to. Its files are closed before they are opened again: closing and opening
-//! both hold [`Asleep::opening`].
+//! lock, is used by nobody, and nobody can begin to. Its files are closed before they are opened again: closing and
+//! opening both hold [`Asleep::opening`].
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -37,11 +37,13 @@ const RETRY: Duration = Duration::from_secs(1);
 const PLACE_MAX: Duration = Duration::from_secs(5);
 
 impl Catalog {
-    /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one is given up.
+    /// The map of that name, which is opened where it sleeps: once for all requests meanwhile, even where the first one
+    /// is given up.
     ///
     /// A disk that hangs under a map keeps nobody waiting for ever, and no other map from being opened: after
     /// [`PLACE_MAX`] its place goes to another. Nor do those who wait for it keep requests for other maps out: they are
-    /// a share of all requests, of one asker as many as places are left.
+    /// a share of all requests, half of it for one map; of both, one asker has as many as places are left. Once its
+    /// opening has taken longer than that, nobody waits for it any more.
     pub(crate) async fn get(
         self: &Arc<Self>,
         name: &Reachable,
@@ -54,8 +56,13 @@ impl Catalog {
                 Place::Awake(map) => return Ok(map),
                 Place::Asleep(asleep) => asleep,
             };
+            if asleep.is_opened_for(PLACE_MAX) {
+                return Err(still_opening(name.name()));
+            }
             if waiting.is_none() {
-                waiting = Some(self.waiting.take(asker).ok_or_else(|| too_many_wait(name.name()))?);
+                let of_map = asleep.wait(asker, self.waiting.most());
+                let places = of_map.zip(self.waiting.take(asker));
+                waiting = Some(places.ok_or_else(|| too_many_wait(name.name()))?);
             }
             // A request that waits holds no thread.
             let opened = timeout(OPENING_MAX, Arc::clone(self).open_for_request(name.name().clone(), asleep));
@@ -109,7 +116,7 @@ impl Catalog {
         else {
             return Ok(false);
         };
-        match open_one(data_dir, name, asleep.folders.as_deref(), progress) {
+        match asleep.open(|| open_one(data_dir, name, asleep.folders.as_deref(), progress)) {
             Ok(opened) => {
                 let robots = asleep.robots.lock().take().unwrap_or_default();
                 let map =
@@ -142,8 +149,8 @@ impl Catalog {
         unused.map(|map| map.name.clone()).collect()
     }
 
-    /// Saves a map that nobody has asked for for so long, and takes it out of memory, where nobody uses it, no keep-out of
-    /// it is to end, and it can be saved; true where it did. Waits for the disk.
+    /// Saves a map that nobody has asked for for so long, and takes it out of memory, where nobody uses it, no keep-out
+    /// of it is to end, and it can be saved; true where it did. Waits for the disk.
     pub(crate) fn put_to_sleep(&self, name: &MapName, unused_for: Duration, budget: &ResourceBudget) -> bool {
         let found = self.maps.read().open.get(name).cloned();
         let Some(info) = found.and_then(|map| map.prepare_to_sleep(budget)) else { return false };
@@ -204,7 +211,7 @@ fn too_many_wait(name: &MapName) -> ServiceError {
 /// A map whose opening takes longer than anybody waits for.
 fn still_opening(name: &MapName) -> ServiceError {
     let message = format!(
-        "map {name} has been opened for {OPENING_MAX:?} and more: it is large, or its disk hangs; try again"
+        "map {name} has been opened for {PLACE_MAX:?} and more: it is large, or its disk hangs; try again"
     );
     ServiceError::new(Reason::CatalogBusy, message).retry_after(OPENING_MAX)
 }

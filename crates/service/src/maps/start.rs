@@ -13,8 +13,8 @@ use mrol_store::{Opened, StoreError};
 use tokio::time::timeout;
 
 impl Catalog {
-    /// Opens the maps of the data folder, side by side; each is served as soon as it is open, and one that fails keeps no
-    /// other back. `opened` is called of each. Waits for the disk.
+    /// Opens the maps of the data folder, side by side; each is served as soon as it is open, and one that fails keeps
+    /// no other back. `opened` is called of each. Waits for the disk.
     ///
     /// # Errors
     /// `Cancelled` once the progress with which the catalog was made was cancelled.

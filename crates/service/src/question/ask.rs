@@ -27,7 +27,7 @@ const INLINE_BYTES: usize = 2 << 20;
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
 const CHECKED_INLINE_BYTES: usize = 64 << 10;
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
@@ -64,7 +64,7 @@ impl MapService {
             };
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
-                let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
+                let _reserved = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
                 let answer = |stop: StopSignal<'_>| {
                     map.answer_question(&map.questioned(limits), &question, limits, stop)
                 };

@@ -44,7 +44,8 @@ pub struct GridTile {
     pub grid: Answered<Grid>,
 }
 
-/// A grid in tiles, from the smallest y on, in each row from the smallest x: each is drawn when the one before it was taken.
+/// A grid in tiles, from the smallest y on, in each row from the smallest x: each is drawn when the one before it was
+/// taken.
 #[derive(Debug)]
 pub struct GridTiles {
     service: MapService,
@@ -57,8 +58,8 @@ pub struct GridTiles {
 }
 
 impl MapService {
-    /// Begins to draw a grid in tiles of one revision each: of any size up to [`TILED_CELLS_MAX`], where a question for all
-    /// of it would have too many cells or take too long. Changes of the map go on between two tiles.
+    /// Begins to draw a grid in tiles of one revision each: of any size up to [`TILED_CELLS_MAX`], where a question for
+    /// all of it would have too many cells or take too long. Changes of the map go on between two tiles.
     ///
     /// # Errors
     /// As a question has them; `ResourceExhausted` for too many cells.

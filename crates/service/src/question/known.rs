@@ -1,4 +1,4 @@
-//! What of a map is known to who copies a region of it, and whether that is enough for an answer.
+//! What a copy of a region knows of a map, and whether that is enough for an answer.
 
 use crate::error::{Reason, ServiceError};
 use mrol_map::map::Region;

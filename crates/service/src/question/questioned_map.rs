@@ -65,7 +65,7 @@ impl<'a> QuestionedMap<'a> {
                 let view = self.planner.get().and_then(Planner::try_view);
                 view.and_then(|view| if counts_keep_outs { view.try_with_keep_outs() } else { Some(view) })
             }
-            // Who takes viewpoints may have to mend the fields by them.
+            // Taking viewpoints may take mending the fields by them.
             (false, Unknown::Occupied) => None,
         };
         view.ok_or_else(|| ended_early(stop))

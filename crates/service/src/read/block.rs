@@ -17,7 +17,7 @@ use mrol_map::map::{
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::{Lattice, VoxelSet};
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const BLOCK: &str = "a block";
 
 impl MapService {

@@ -21,7 +21,7 @@ use mrol_map::util::StopSignal;
 use mrol_map::voxel::VoxelKey;
 use mrol_store::{JournalPart, MapFolder, StoreError, VoxelMention};
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const OBSERVERS: &str = "a list of observers";
 
 impl MapService {
@@ -228,7 +228,7 @@ mod tests {
                         let undo = Undo { target: UndoTarget::Revision(revision), request_id: None };
                         service.undo(&map(), undo).await.unwrap();
                     }
-                    // Who touched a voxel did so, whether or not it is there still.
+                    // A scan touched a voxel whether or not it is there still.
                     7 => {
                         let target = DeletionTarget::Keys(vec![key(scans[0].1[0])]);
                         let deletion = Deletion { target, level: 0, request_id: None };

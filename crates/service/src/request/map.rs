@@ -37,7 +37,8 @@ pub struct MapInfo {
     /// The last scan of each robot since the server was started, by name, whether it was accepted or not; of a list of
     /// maps, none.
     pub sightings: Vec<Sighting>,
-    /// Bytes of memory of the exact sets of all levels; this and the bytes below are what a map that sleeps had in memory.
+    /// Bytes of memory of the exact sets of all levels; this and the bytes below are what a map that sleeps had in
+    /// memory.
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments, which alignments are refined with.
     pub moment_bytes: usize,

@@ -32,9 +32,9 @@ pub struct WatchedSince {
     pub revision: u64,
     /// The map that this is a revision of.
     pub map_uuid: Uuid,
-    /// The content hash that the map had at that revision, as the caller was told. Where the map had another, or none that
-    /// is known, the whole state comes first: an older data folder was put back, and the caller has what was lost. Without
-    /// it, the revision alone is believed.
+    /// The content hash that the map had at that revision, as the caller was told. Where the map had another, or none
+    /// that is known, the whole state comes first: an older data folder was put back, and the caller has what was lost.
+    /// Without it, the revision alone is believed.
     pub content_hash: Option<ContentHash>,
     /// The state hash that the map had at that revision, as the caller was told: the same for keep-outs and viewpoints
     /// too.

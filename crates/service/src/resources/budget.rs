@@ -12,7 +12,7 @@ use super::watermarks::Watermarks;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Marks;
 
-/// Percentage of what the process may have in memory up to which some is lent for a while.
+/// Percentage of what the process may have in memory up to which some is reserved for a while.
 const LENT_PERCENT: u64 = 95;
 
 /// What there is of disk and memory, and what of it is reserved. Without gauges there is room for everything.
@@ -202,10 +202,10 @@ mod tests {
     #[test]
     fn what_is_lent_may_lie_above_the_mark_and_not_above_what_there_is() {
         let budget = budget(900, 10_000);
-        let lent = budget.reserve_transient(50 * MIB, "a snapshot").unwrap();
+        let reserved = budget.reserve_transient(50 * MIB, "a snapshot").unwrap();
         let refused = budget.reserve_transient(MIB, "a snapshot").unwrap_err();
         assert!(refused.message.contains("a snapshot takes 1 MiB"), "{}", refused.message);
-        drop(lent);
+        drop(reserved);
         assert!(budget.reserve_transient(MIB, "a snapshot").is_ok());
     }
 

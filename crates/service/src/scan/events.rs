@@ -53,7 +53,7 @@ impl MapService {
     }
 }
 
-/// A watch of the events of a map. Who falls behind what is kept misses events, and is told of the next.
+/// A watch of the events of a map. One that falls behind what is kept misses events, and is told of the next.
 #[derive(Debug)]
 pub struct EventWatch {
     map: Arc<HostedMap>,

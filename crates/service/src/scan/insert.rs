@@ -17,10 +17,10 @@ impl MapService {
     /// Aligns a scan and, where it fits, adds it.
     ///
     /// # Errors
-    /// `PermissionDenied` for a robot that is not the caller's, and with `scope_too_small` for a caller that sends scans
-    /// alone and asks to carve; `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
-    /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
-    /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
+    /// `PermissionDenied` for a robot that is not the caller's, and with `scope_too_small` for a caller that sends
+    /// scans alone and asks to carve; `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an
+    /// accepted id; `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while
+    /// disk or memory is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let robot = scan.robot.clone();
         let work = async {
@@ -78,8 +78,8 @@ impl MapService {
         if let Some(judged) = self.submit_and_wait(of, (mapping, &requester), None, at_first).await? {
             return Ok(judged);
         }
-        // What keeps failing gives way to what may succeed: its threads are nice, and while others have work they hardly
-        // run. A robot of which a scan takes long now and then waits for turns, and not for idle cores.
+        // What keeps failing gives way to what may succeed: its threads are nice, and while others have work they
+        // hardly run. A robot of which a scan takes long now and then waits for turns, and not for idle cores.
         let lane = if long_mapping.is_failing(&requester) { long_mapping } else { mapping };
         let thread = limit.wait(lane.thread(&requester)).await??;
         let judged = self.submit_and_wait(of, (lane, &requester), Some(thread), submit(Effort::Whole)).await;

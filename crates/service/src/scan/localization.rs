@@ -189,7 +189,7 @@ impl HostedMap {
         let limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
         let stop = stop.by(start + limit);
         let all = request.points.as_slice();
-        let _copy = budget.reserve_transient(size_of_val(all) as u64, WHOM)?;
+        let _copy = budget.reserve_transient(size_of_val(all) as u64, RESERVED_FOR)?;
         let skipped = SkippedPoints::of(all, &PointFilter::default());
         let points: Vec<Point> =
             all.iter().copied().filter(|point| PointFilter::default().keeps(*point)).collect();
@@ -202,15 +202,16 @@ impl HostedMap {
             return Err(ServiceError::new(Reason::NoReturns, message));
         }
         let search = search_settings(settings.limits.localization_grid_bytes_max);
-        let mut lent: Vec<Reservation> = Vec::new();
+        let mut reserved: Vec<Reservation> = Vec::new();
         let mut refused = None;
         let supervision = &mut Supervision {
             stop,
             search_stop: stop.by(start + limit.mul_f64(SEARCH_SHARE)),
             progress: &mut |_| (),
             reserve: &mut |bytes| {
-                let more =
-                    budget.reserve_transient(bytes as u64, WHOM).map(|reservation| lent.push(reservation));
+                let more = budget
+                    .reserve_transient(bytes as u64, RESERVED_FOR)
+                    .map(|reservation| reserved.push(reservation));
                 more.map_err(|error| refused = Some(error)).is_ok()
             },
         };
@@ -226,8 +227,8 @@ impl HostedMap {
     }
 }
 
-/// Whom a search's memory is lent to.
-const WHOM: &str = "a search with no guess";
+/// Name under which the memory of a search is reserved, for refusals.
+const RESERVED_FOR: &str = "a search with no guess";
 
 /// The search's settings where its grids may take `grid_bytes_max`: the cells that wait take half as much at most.
 pub(super) fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {

@@ -1,8 +1,8 @@
 //! The search for lost robots, beside everything else that the server does.
 //!
 //! A robot that asked for it (see [`RobotSettings::recover`](crate::RobotSettings)) is searched for after a scan of it
-//! was refused: on threads of their own that give way to all others, and in turn. The answer to the scan does not wait for it.
-//! Whether the robot is where the search saw it, its next scan tells.
+//! was refused: on threads of their own that give way to all others, and in turn. The answer to the scan does not wait
+//! for it. Whether the robot is where the search saw it, its next scan tells.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,8 +18,8 @@ use mrol_map::align::localize::Supervision;
 use mrol_map::mapping::{ScanMapper, SearchTask};
 use mrol_map::util::StopSignal;
 
-/// Whom a search's memory is lent to.
-const WHOM: &str = "a search for a lost robot";
+/// Name under which the memory of a search is reserved, for refusals.
+const RESERVED_FOR: &str = "a search for a lost robot";
 
 impl MapService {
     /// Begins to search for the robot of a scan that was refused, if it asked for it.
@@ -56,14 +56,14 @@ impl HostedMap {
         stop: StopSignal<'_>,
     ) {
         let (start, limit) = (Instant::now(), seconds(settings.limits.recovery_search_time_max_s));
-        let mut lent: Vec<Reservation> = Vec::new();
+        let mut reserved: Vec<Reservation> = Vec::new();
         let supervision = &mut Supervision {
             stop: stop.by(start + limit),
             search_stop: stop.by(start + limit.mul_f64(SEARCH_SHARE)),
             progress: &mut |_| (),
             reserve: &mut |bytes| {
-                let more = budget.reserve_transient(bytes as u64, WHOM);
-                more.map(|reservation| lent.push(reservation)).is_ok()
+                let more = budget.reserve_transient(bytes as u64, RESERVED_FOR);
+                more.map(|reservation| reserved.push(reservation)).is_ok()
             },
         };
         let outcome = mapper.search(task, supervision);

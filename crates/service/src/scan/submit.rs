@@ -14,7 +14,7 @@ use crate::work::check_not_stopped;
 use mrol_map::align::Verdict;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
-use mrol_map::mapping::{Carving, LocatedScan, MappingError, ScanMapper, deskewed};
+use mrol_map::mapping::{Decision, LocatedScan, MappingError, ScanMapper, deskewed};
 use mrol_map::util::StopSignal;
 use mrol_map::visibility::VIEWPOINT_MEMORY_MAX;
 
@@ -71,27 +71,24 @@ impl HostedMap {
         }
         let recovered = mapper.recover(&scan.to_map(), located, stop);
         check_not_stopped(stop)?;
-        let located = mapper.told(&scan.to_map(), recovered?);
-        if located.is_accepted() || request.at_guess || request.force {
+        let recovered = recovered?;
+        if recovered.is_accepted() || request.at_guess || request.force {
             // Where nobody asks for it any more, too.
             self.robots.lost.found(&request.robot);
         }
-        self.robots.sightings.note(&scan.to_map(), &located);
+        let decision = mapper.decide(&scan.to_map(), recovered, stop);
+        check_not_stopped(stop)?;
+        let decision = decision?;
+        let (located, scan_record, carved_at) = match decision {
+            Decision::Refused(located) => return Ok(Step::Answered(Some(self.judged(&scan, &located)))),
+            Decision::Stationary(located) => {
+                let judged = self.judged(&scan, &located);
+                let answer = ScanAnswer { accepted: true, stationary: true, ..judged.answer };
+                return Ok(Step::Answered(Some(Judged { answer, sample: Vec::new(), ..judged })));
+            }
+            Decision::Insert { located, record, carved_at } => (located, *record, carved_at),
+        };
         let judged = self.judged(&scan, &located);
-        if !judged.answer.accepted && !request.force {
-            return Ok(Step::Answered(Some(judged)));
-        }
-        let scan_record = mapper.record(&scan.to_map(), &located, stop);
-        check_not_stopped(stop)?;
-        let mut scan_record = scan_record?;
-        let carving = mapper.carve(&scan.to_map(), &located, &scan_record, stop);
-        check_not_stopped(stop)?;
-        let Carving { voxels: carved, revision: carved_at } = carving?;
-        scan_record.carved = carved;
-        if mapper.note_stationary(&scan.to_map(), &scan_record) {
-            let answer = ScanAnswer { accepted: true, stationary: true, ..judged.answer };
-            return Ok(Step::Answered(Some(Judged { answer, sample: Vec::new(), ..judged })));
-        }
         let ScanRecord { voxels, carved, moments, viewpoint, .. } = &scan_record;
         let moments = moments.as_slice().len();
         let of_viewpoint = viewpoint.as_ref().map_or(0, |_| VIEWPOINT_MEMORY_MAX as u64);
@@ -161,7 +158,7 @@ impl HostedMap {
     }
 
     /// True of a scan whose id was not accepted before, so that it may add something. Does not wait: while the
-    /// trajectory changes it says false, and who then aligns the scan finds out.
+    /// trajectory changes it says false, and the alignment finds out.
     pub(super) fn is_new(&self, request: &ScanRequest) -> bool {
         let Some(trajectory) = self.map.try_trajectory() else {
             return false;

@@ -9,7 +9,7 @@ use tokio_stream::{Stream, StreamExt};
 use crate::error::{Reason, ServiceError};
 use mrol_map::sync::polled_by_runtime;
 
-/// Who has messages to tell, one after the other.
+/// A source of messages, one after the other.
 pub(crate) trait Teller: Send + 'static {
     /// A message.
     type Message: Send + 'static;
@@ -26,7 +26,7 @@ pub(crate) trait Teller: Send + 'static {
 /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where
 /// the client took no message for `unread_max_s`.
 ///
-/// A message is made when there is room for it on the way: nothing piles up for who reads slowly.
+/// A message is made when there is room for it on the way: nothing piles up for slow readers.
 pub(crate) fn stream_of<T: Teller>(
     mut teller: T,
     unread_max_s: f64,

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A watcher is where it is: nothing waits for it, and nothing is kept for it. Its next message is made when there is
-//! room for it on the way to its client. Who falls behind the ring is told from the journal, and behind that of the
-//! whole state.
+//! room for it on the way to its client. A watch that falls behind the ring is told from the journal, and behind that
+//! of the whole state.
 
 mod backpressure;
 mod map_watch;

@@ -33,7 +33,7 @@ enum NextPart {
 }
 
 impl StateParts {
-    /// What there is to tell of a state of a map with this lattice to who asked for this.
+    /// The messages of a state of a map with this lattice, for a watcher that asked for this.
     pub(super) fn of(state: Arc<FullState>, watched: Watched, lattice: &Lattice) -> Self {
         Self { state, watched, lattice: *lattice, is_begun: false, next: Some(NextPart::Block(0)) }
     }

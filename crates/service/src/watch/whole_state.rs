@@ -9,7 +9,7 @@ use crate::resources::ResourceBudget;
 use crate::work::check_not_stopped;
 use mrol_map::util::StopSignal;
 
-/// Whom memory is lent to, in refusals.
+/// Name under which the memory is reserved, for refusals.
 const WATCH: &str = "a watch";
 /// Bytes of memory of a block.
 pub(crate) const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
@@ -39,7 +39,7 @@ impl HostedMap {
         let view = long_read.view().with_keep_outs().with_viewpoints();
         let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
         // Lent while it is made; then it lies in memory, and is measured there.
-        let _lent = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
+        let _reserved = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
         let (parts, version) = (view.level_blocks(level, stop), view.version());
         let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         let viewpoints = view.viewpoints().cloned().unwrap_or_default();

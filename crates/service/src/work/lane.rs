@@ -43,7 +43,7 @@ pub(super) struct LaneSettings {
 pub(crate) struct Lane {
     name: &'static str,
     threads: Arc<Threads>,
-    /// Who gets a thread that has no job.
+    /// The queue for threads that have no job.
     queue: FairQueue,
     /// Callers that wait for their robot or their map to be free.
     waiting_for_locks: Arc<Shares>,
@@ -65,8 +65,8 @@ struct Counts {
 /// What became of the jobs of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LaneUse {
-    /// The lane's: `read`, `query`, `message`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`, `undo`,
-    /// `map_file`, `watch`, `observers`, `blocks` or `planning`.
+    /// The lane's: `read`, `query`, `message`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`,
+    /// `undo`, `map_file`, `watch`, `observers`, `blocks` or `planning`.
     pub name: &'static str,
     /// Jobs that wait for a thread.
     pub waiting: usize,
@@ -112,8 +112,8 @@ impl Lane {
         Self { queue, ..self }
     }
 
-    /// Waits for `lock`, before which a job makes no sense. Those that wait are as many as jobs may, and of one asker as
-    /// many as there are places left.
+    /// Waits for `lock`, before which a job makes no sense. Those that wait are as many as jobs may, and of one asker
+    /// as many as there are places left.
     ///
     /// # Errors
     /// `ResourceExhausted` at once when others have the lock and too many wait.
@@ -196,7 +196,7 @@ impl Lane {
             let caller_gone = || answer.is_closed();
             let stop = StopSignal::when(&caller_gone).giving_way_by(&pauses);
             let done = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| job(stop))));
-            // Who is answered may ask again at once.
+            // A caller that is answered may ask again at once.
             drop(pauses.held);
             drop(at_work);
             drop(threads);

@@ -19,15 +19,15 @@ const LARGE_PAUSED_MAX: usize = 2;
 /// Points of a query that takes some milliseconds at most; an eighth where they are compared with keep-outs.
 const SHORT_QUERY_POINTS: usize = 64 << 10;
 
-/// Messages and parts of answers that wait, of which `limits.requests_max` has bounded how many there are: an answer that
-/// is begun is not refused halfway.
+/// Messages and parts of answers that wait, of which `limits.requests_max` has bounded how many there are: an answer
+/// that is begun is not refused halfway.
 const MESSAGES_WAITING_MAX: usize = u32::MAX as usize;
 
 /// The lanes.
 #[derive(Debug)]
 pub(crate) struct Lanes {
-    /// For what is read in a few milliseconds: descriptions, keep-outs, queries of a scan's points. Nothing else, so that
-    /// none of it waits for what takes long.
+    /// For what is read in a few milliseconds: descriptions, keep-outs, queries of a scan's points. Nothing else, so
+    /// that none of it waits for what takes long.
     pub(crate) reads: Lane,
     /// For long queries, listings and trajectories, so that no alignment starves them.
     pub(crate) queries: Lane,
@@ -36,7 +36,8 @@ pub(crate) struct Lanes {
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     pub(crate) mapping: Lane,
     /// For scans that take long, a second and more each, of robots and keys whose long scans keep failing: while robots
-    /// whose scans fit map on, it hardly runs. A scan that takes long now and then stays in `mapping`, and gives way there.
+    /// whose scans fit map on, it hardly runs. A scan that takes long now and then stays in `mapping`, and gives way
+    /// there.
     pub(crate) long_mapping: Lane,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     pub(crate) alignment: Lane,

@@ -32,13 +32,13 @@ impl GiveWay for Pauses<'_> {
             return;
         }
         let mut held = self.held.borrow_mut();
-        // Who takes the turn needs a thread of the system besides this one, which waits.
+        // The job that takes the turn needs a thread of the system besides this one, which waits.
         if self.threads.have(self.queue.threads_wanted()).is_err() {
             return;
         }
         let begin = Instant::now();
         let Some(turn) = self.queue.pause(&mut held) else { return };
-        // The queue gives a thread to everybody who waits, and refuses nobody who was begun.
+        // The queue gives a thread to every waiter, and refuses no job that was begun.
         if let Ok(thread) = turn.blocking_recv() {
             *held = thread;
         }

@@ -1,9 +1,9 @@
 //! Those who take turns at something, and whose turn is next.
 //!
-//! Each has a charge, which a turn raises by [`TURN`], and by as much again at most where it cost much. Next is, of those
-//! who have the fewest turns in hand, the one with the least charge, and of equal ones the one whose last turn is longest
-//! ago. Since no turn is charged more than twice another, nobody waits for more than two turns of anybody else. Who comes
-//! anew is charged almost as for a turn, so that newcomers, however many they are, overtake nobody for long.
+//! Each has a charge, which a turn raises by [`TURN`], and by as much again at most where it cost much. Next is, of
+//! those who have the fewest turns in hand, the one with the least charge, and of equal ones the one whose last turn is
+//! longest ago. Since no turn is charged more than twice another, nobody waits for more than two turns of anybody else.
+//! Who comes anew is charged almost as for a turn, so that newcomers, however many they are, overtake nobody for long.
 
 /// What every turn is charged.
 pub(crate) const TURN: u64 = 1000;
@@ -48,7 +48,7 @@ impl<Id: PartialEq + Clone, Of: Default> Row<Id, Of> {
         self.members.iter_mut().find(|member| member.id == *id)
     }
 
-    /// The one of this name, who joins the row where it is not there.
+    /// The one of this name, which joins the row where it is not there.
     pub(crate) fn join(&mut self, id: &Id) -> &mut Member<Id, Of> {
         let known = self.members.iter().position(|member| member.id == *id);
         let at = known.unwrap_or_else(|| {

@@ -7,8 +7,8 @@ use parking_lot::Mutex;
 
 use super::asker::Asker;
 
-/// A number of places. An asker may hold at most as many as are left. So the first can take half of them and the next half
-/// of the rest, and a late asker still finds a place.
+/// A number of places. An asker may hold at most as many as are left. So the first can take half of them and the next
+/// half of the rest, and a late asker still finds a place.
 #[derive(Debug)]
 pub(crate) struct Shares {
     most: usize,
@@ -25,6 +25,11 @@ pub(crate) struct Share {
 impl Shares {
     pub(crate) fn new(most: usize) -> Self {
         Self { most, taken: Mutex::default() }
+    }
+
+    /// How many places there are.
+    pub(crate) fn most(&self) -> usize {
+        self.most
     }
 
     /// A place; none where the asker has as many as are left.

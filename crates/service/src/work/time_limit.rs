@@ -9,7 +9,8 @@ use crate::error::{Reason, ServiceError};
 use mrol_map::util::StopSignal;
 
 /// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
-/// deadline bounds. The time while it gives way to others does not count. A clone is the same limit of the same request.
+/// deadline bounds. The time while it gives way to others does not count. A clone is the same limit of the same
+/// request.
 #[derive(Debug, Clone)]
 pub(crate) struct TimeLimit {
     name: &'static str,
@@ -65,7 +66,7 @@ impl TimeLimit {
 /// Ends work that nobody waits for, or that takes too long.
 ///
 /// # Errors
-/// `caller_gone` when the caller has gone, who is therefore not told; `time_limit` when the time is up.
+/// `caller_gone` if the caller has disconnected (never sent); `time_limit` when the time is up.
 pub(crate) fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
     if stop.is_stopped() { Err(ended_early(stop)) } else { Ok(()) }
 }

@@ -37,8 +37,8 @@ fn shell(length_m: f64, width_m: f64) -> Vec<Object> {
     shapes.into_iter().map(|shape| Object::new(vec![shape])).collect()
 }
 
-/// A rectangular room about the origin with `pieces` of furniture, of kinds, sizes and places drawn from `seed`, none within a meter
-/// of its middle. The first `moved` of them were carried to other places since.
+/// A rectangular room about the origin with `pieces` of furniture, of kinds, sizes and places drawn from `seed`, none
+/// within a meter of its middle. The first `moved` of them were carried to other places since.
 pub(super) fn rectangular_room(
     seed: u64,
     [length_m, width_m]: [f64; 2],
@@ -68,8 +68,8 @@ pub(super) fn rectangular_room(
     objects
 }
 
-/// An aisle along x between two rows of shelves with an upright every `period_m`, in a hall of `length_m` whose ends lie at 0 and
-/// there; what lies on the shelves is the same in every bay.
+/// An aisle along x between two rows of shelves with an upright every `period_m`, in a hall of `length_m` whose ends
+/// lie at 0 and there; what lies on the shelves is the same in every bay.
 pub(super) fn aisle(period_m: f64, length_m: f64) -> Vec<Object> {
     let (width_m, depth_m) = (3.0, 0.8);
     let hall = shell(length_m, width_m + 2.0 * depth_m + 0.1);

@@ -21,20 +21,20 @@ impl Scene {
         Self { objects: [building::building(), furnish::furniture(seed)].concat() }
     }
 
-    /// A hall of 20 x 14 x 2.7 m with six pillars and furniture along its walls drawn from `seed`, and nothing else within
-    /// 4.5 m of its center (10, 7): room to drive circles in.
+    /// A hall of 20 x 14 x 2.7 m with six pillars and furniture along its walls drawn from `seed`, and nothing else
+    /// within 4.5 m of its center (10, 7): room to drive circles in.
     pub fn hall(seed: u64) -> Self {
         Self { objects: hall::hall(seed) }
     }
 
-    /// Two rooms of 7 x 5 x 2.7 m without doors, the first with a corner at the origin, the second `apart_m` from it along
-    /// x, with the same cupboards drawn from `seed`: a scan of one is a scan of the other.
+    /// Two rooms of 7 x 5 x 2.7 m without doors, the first with a corner at the origin, the second `apart_m` from it
+    /// along x, with the same cupboards drawn from `seed`: a scan of one is a scan of the other.
     pub fn equal_rooms(seed: u64, apart_m: f64) -> Self {
         Self { objects: equal_rooms::equal_rooms(seed, apart_m) }
     }
 
-    /// A room of `size_m` (length and width) and 2.7 m of height about the origin, with as many pieces of furniture drawn from `seed`: turned around, its
-    /// walls look the same.
+    /// A room of `size_m` (length and width) and 2.7 m of height about the origin, with as many pieces of furniture
+    /// drawn from `seed`: turned around, its walls look the same.
     pub fn rectangular_room(seed: u64, size_m: [f64; 2], pieces: usize) -> Self {
         Self { objects: places::rectangular_room(seed, size_m, pieces, 0) }
     }
@@ -49,8 +49,8 @@ impl Scene {
         Self { objects: places::aisle(period_m, length_m) }
     }
 
-    /// A yard under the open sky: level ground of 120 x 120 m about the origin, and four containers on it, 15 to 25 m from its middle, drawn
-    /// from `seed`.
+    /// A yard under the open sky: level ground of 120 x 120 m about the origin, and four containers on it, 15 to 25 m
+    /// from its middle, drawn from `seed`.
     pub fn yard(seed: u64) -> Self {
         Self { objects: places::yard(seed) }
     }

@@ -53,7 +53,8 @@ impl SpinningLidar {
             .collect()
     }
 
-    /// [`SpinningLidar::scan`] of a driver that tells where nothing returned: by a point at `no_return_m` in that direction.
+    /// [`SpinningLidar::scan`] of a driver that tells where nothing returned: by a point at `no_return_m` in that
+    /// direction.
     pub fn scan_telling_no_returns(
         &self,
         scene: &Scene,

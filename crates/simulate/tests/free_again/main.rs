@@ -1,8 +1,8 @@
 //! What is taken away is free again within three scans, for a robot that stands; and thin things that stand are kept.
 //!
-//! Three seeds of each scene; with `MROL_FREE_AGAIN_SEEDS=6` and `--nocapture` it prints the figures of docs/measurements.md ("Free
-//! again"). With `MROL_PEER_DIR` the scans are written there for OctoMap, and what it
-//! made of them is read from there.
+//! Three seeds of each scene; with `MROL_FREE_AGAIN_SEEDS=6` and `--nocapture` it prints the figures of
+//! docs/measurements.md ("Free again"). With `MROL_PEER_DIR` the scans are written there for OctoMap, and what it made
+//! of them is read from there.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
@@ -20,8 +20,8 @@ fn seeds() -> std::ops::RangeInclusive<u64> {
     1..=std::env::var("MROL_FREE_AGAIN_SEEDS").map_or(3, |seeds| seeds.parse().unwrap())
 }
 
-/// Of the place of what went, so much has to be free after three scans, and so many of its voxels may be left, percent. Carving leaves
-/// some beside rims, and next to the floor.
+/// Of the place of what went, so much has to be free after three scans, and so many of its voxels may be left, percent.
+/// Carving leaves some beside rims, and next to the floor.
 const FREE_LEAST: usize = 85;
 const LEFT_MOST: usize = 30;
 /// So many voxels of thin things may be lost, percent.
@@ -69,9 +69,10 @@ fn run(kind: Kind, seed: u64) -> (Figures, [usize; 2]) {
         if step == BEFORE && !is_thin {
             things = robot.voxels().intersection(&around).copied().collect();
         }
-        assert!(robot.map(&points, &truth), "{kind:?} {seed}: scan {step} is refused");
+        let of = format!("{kind:?} {seed}, scan {step}");
+        robot.map(&points, &truth).expect(&of);
         if is_thin {
-            assert!(keeping.map(&points, &truth), "{kind:?} {seed}: scan {step} is refused");
+            keeping.map(&points, &truth).expect(&of);
         }
         scans.push((points, truth));
     }
@@ -150,7 +151,7 @@ fn a_robot_that_stands_before_people_who_come_and_go_leaves_few_viewpoints() {
     for i in 0..300 {
         // It is there for two of nine scans.
         let points = situation.scan(if i % 9 < 2 { 0 } else { BEFORE });
-        robot.map(&points, &truth);
+        robot.map(&points, &truth).expect("it stands where it stood");
         counts.push(robot.map.viewpoints().len());
     }
     assert!(counts[299] <= 5 && counts[299] == counts[149], "{counts:?}");

@@ -31,8 +31,11 @@ impl Robot {
         }
     }
 
-    /// Maps a scan from near `truth`; true of one that fits.
-    pub(crate) fn map(&self, points: &[Point], truth: &Pose) -> bool {
+    /// Maps a scan from near `truth`.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub(crate) fn map(&self, points: &[Point], truth: &Pose) -> Result<(), String> {
         let robot = RobotName::new("r").unwrap();
         let ends = RayEnds { points, times_s: None };
         let filtered = FilteredPoints::of(ends, self.filter, &robot, false).unwrap();
@@ -45,7 +48,8 @@ impl Robot {
             ..Scan::new(&robot, filtered.surroundings().points)
         };
         let mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);
-        mapper.map_scan(&scan, StopSignal::NEVER).unwrap().located.is_accepted()
+        let located = mapper.map_scan(&scan, StopSignal::NEVER).unwrap().located;
+        if located.is_accepted() { Ok(()) } else { Err(located.alignment.reason) }
     }
 
     /// The finest voxels.
@@ -58,7 +62,7 @@ impl Robot {
         let view = self.map.view().with_viewpoints();
         let seen = view.viewpoints().unwrap();
         let is_free = |voxel: &&VoxelKey| {
-            !view.contains(**voxel, 0) && seen.sees_through(view.lattice().center_m(**voxel, 0))
+            !view.contains(**voxel, 0) && seen.is_free(view.lattice().center_m(**voxel, 0))
         };
         voxels.into_iter().filter(is_free).count()
     }

@@ -3,7 +3,7 @@
 use super::unreadable::Unreadable;
 use crate::pb;
 use mrol_map::util::StopSignal;
-use mrol_map::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey, VoxelSet};
+use mrol_map::voxel::{BLOCKS_PER_STOP_CHECK, BlockMask, VoxelKey, VoxelSet};
 
 impl From<&VoxelSet> for pb::Voxels {
     fn from(voxels: &VoxelSet) -> Self {
@@ -23,7 +23,7 @@ impl TryFrom<pb::Voxels> for VoxelSet {
 pub(crate) fn write(voxels: &VoxelSet, stop: StopSignal<'_>) -> pb::Voxels {
     let (mut before, count) = (0, voxels.blocks().len());
     let (mut key_gaps, mut octrees) = (Vec::with_capacity(count), Vec::with_capacity(count * 16));
-    for (key, mask) in stop.pieces(voxels.blocks(), BLOCKS_PER_LOOK).flatten() {
+    for (key, mask) in stop.pieces(voxels.blocks(), BLOCKS_PER_STOP_CHECK).flatten() {
         let bits = key.to_bits();
         key_gaps.push(bits - std::mem::replace(&mut before, bits));
         write_octree(mask, &mut octrees);
@@ -37,7 +37,7 @@ pub(crate) fn read(voxels: &pb::Voxels, stop: StopSignal<'_>) -> Result<VoxelSet
         return Err(format!("voxels.octrees has {} bytes, and there is no block", voxels.octrees.len()));
     }
     let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
-    for block in stop.paced(blocks_of(voxels), BLOCKS_PER_LOOK) {
+    for block in stop.paced(blocks_of(voxels), BLOCKS_PER_STOP_CHECK) {
         blocks.push(block?);
     }
     Ok(VoxelSet::of_blocks_until(blocks, stop))

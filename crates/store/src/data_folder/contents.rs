@@ -81,8 +81,8 @@ impl DataDir {
         Ok(self.entries()?.into_iter().filter(has_it).map(|entry| self.maps.join(entry)).collect())
     }
 
-    /// Adds the bytes that opening the maps of `folders` will read to `progress`. Problems with a map are reported when it
-    /// is opened.
+    /// Adds the bytes that opening the maps of `folders` will read to `progress`. Problems with a map are reported when
+    /// it is opened.
     pub fn expect(&self, folders: &BTreeMap<MapName, Vec<String>>, progress: &OpeningProgress) {
         for (name, folders) in folders {
             let path = self.path_of(name, folders);

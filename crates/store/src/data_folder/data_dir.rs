@@ -45,8 +45,8 @@ pub struct DataDir {
 }
 
 impl DataDir {
-    /// Opens the data folder, creates it where it does not exist, and locks it. A server that is just ending, or a process that
-    /// inherits the lock for the moment until its program starts, is waited for, up to a second.
+    /// Opens the data folder, creates it where it does not exist, and locks it. A server that is just ending, or a
+    /// process that inherits the lock for the moment until its program starts, is waited for, up to a second.
     ///
     /// # Errors
     /// When another process holds it for longer or the system refuses.

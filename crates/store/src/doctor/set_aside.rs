@@ -60,8 +60,8 @@ pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>,
     Ok(Some(SetAside { folder, revision, keep_outs, viewpoints }))
 }
 
-/// Sets a map file aside that no server takes in, of the first format for example: it is renamed, as it is. Nothing of a damaged
-/// one can be read, so that no map is made. None where there is no such file, or it can be taken in.
+/// Sets a map file aside that no server takes in, of the first format for example: it is renamed, as it is. Nothing of
+/// a damaged one can be read, so that no map is made. None where there is no such file, or it can be taken in.
 ///
 /// # Errors
 /// When the system refuses.

@@ -16,7 +16,7 @@ pub type StoredRecords = Box<dyn Iterator<Item = Result<(u64, StoredRecord), Sto
 /// A log of changes. The sequence numbers are the map's revisions: 1, 2, 3, ...
 pub trait Journal: std::fmt::Debug + Send {
     /// Appends records, which get the revisions after the head, and returns the new head. They are durable after the
-    /// next [`Journal::sync`], so that one sync serves all who wait for it.
+    /// next [`Journal::sync`], so that one sync serves all waiters.
     ///
     /// # Errors
     /// When they cannot be written. The journal then accepts nothing more.

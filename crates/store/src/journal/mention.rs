@@ -1,6 +1,6 @@
 //! What a record says of one voxel, found out without making sets of voxels of it.
 //!
-//! Who looks for the scans that touched a voxel reads many records. A set of voxels that lie far apart takes some forty
+//! A search for the scans that touched a voxel reads many records. A set of voxels that lie far apart takes some forty
 //! times the bytes of its record.
 
 use prost::Message;

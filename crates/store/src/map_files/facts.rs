@@ -116,7 +116,7 @@ impl Facts {
     }
 
     /// Records that the snapshot of `revision` was written, when `appended` bytes of journal had been appended.
-    pub(super) fn tell_saved(&self, revision: u64, appended: u64) {
+    pub(super) fn note_saved(&self, revision: u64, appended: u64) {
         let mut known = self.lock();
         let at = known.snapshots.partition_point(|&snapshot| snapshot < revision);
         if known.snapshots.get(at) != Some(&revision) {
@@ -127,7 +127,7 @@ impl Facts {
     }
 
     /// Records that a snapshot could not be written.
-    pub(super) fn tell_not_saved(&self) {
+    pub(super) fn note_not_saved(&self) {
         let mut known = self.lock();
         known.saved.failed = Some(Instant::now());
         known.saved.failures += 1;
@@ -147,12 +147,12 @@ impl Facts {
     }
 
     /// Records whether what is kept for undo alone could be removed.
-    pub(super) fn tell_given_up(&self, gave_up: bool) {
+    pub(super) fn note_given_up(&self, gave_up: bool) {
         self.lock().gave_up_in_vain = (!gave_up).then(Instant::now);
     }
 
     /// Records the size of the folder's files.
-    pub(super) fn tell_bytes(&self, bytes: u64) {
+    pub(super) fn note_bytes(&self, bytes: u64) {
         let mut known = self.lock();
         known.counted_bytes = bytes.wrapping_sub(known.journal.bytes);
     }

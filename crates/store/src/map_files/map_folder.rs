@@ -109,14 +109,14 @@ impl MapFolder {
     /// # Errors
     /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then still there.
     pub fn save(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
-        let written = self.write(snapshot, bytes_max).inspect_err(|_| self.facts.tell_not_saved());
+        let written = self.write(snapshot, bytes_max).inspect_err(|_| self.facts.note_not_saved());
         self.count_bytes();
         written
     }
 
     /// Counts the bytes in the folder, so that later queries need not read the disk.
     fn count_bytes(&self) {
-        self.facts.tell_bytes(folder::bytes_in(&*self.files, &self.path.get()));
+        self.facts.note_bytes(folder::bytes_in(&*self.files, &self.path.get()));
     }
 
     fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
@@ -158,8 +158,8 @@ impl MapFolder {
         };
         // A part that no snapshot names would take the space that is missing.
         write().inspect_err(|_| drop(self.forget_parts(&parts)))?;
-        parts.tell_written(plan, written);
-        self.facts.tell_saved(revision, appended);
+        parts.note_written(plan, written);
+        self.facts.note_saved(revision, appended);
         self.forget(self.undo_window(), snapshot.contents.trajectory.withdrawn(), &parts)
     }
 
@@ -182,7 +182,7 @@ impl MapFolder {
         self.check_there()?;
         let forgotten = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[], &parts);
         let gave_up = forgotten.is_ok() && self.used().kept_from != before;
-        self.facts.tell_given_up(gave_up);
+        self.facts.note_given_up(gave_up);
         self.count_bytes();
         forgotten.map(|()| gave_up)
     }

@@ -19,7 +19,9 @@ use mrol_map::map::{
     MappedScan, REQUESTS_KEPT, Trajectory,
 };
 use mrol_map::util::StopSignal;
-use mrol_map::voxel::{BLOCKS_PER_LOOK, BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
+use mrol_map::voxel::{
+    BLOCKS_PER_STOP_CHECK, BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet,
+};
 
 /// Field numbers, as in `proto/mrol/store/v1`.
 pub(super) mod number {
@@ -412,7 +414,7 @@ fn voxels_of_version_1(keys: &[u8], masks: &[u8], stop: StopSignal<'_>) -> Resul
         Ok::<_, Unreadable>((key, BlockMask::from_le_bytes(mask)))
     };
     let mut blocks = Vec::with_capacity(keys.len());
-    for key_and_mask in stop.paced(keys.iter().zip(masks), BLOCKS_PER_LOOK) {
+    for key_and_mask in stop.paced(keys.iter().zip(masks), BLOCKS_PER_STOP_CHECK) {
         blocks.push(block(key_and_mask)?);
     }
     Ok(VoxelSet::of_blocks_until(blocks, stop))

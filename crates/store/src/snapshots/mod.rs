@@ -9,8 +9,8 @@
 //!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
 //!                have been acknowledged, u64 little-endian
 //!     32  16     from version 4 on: uuid of the map, as in the body
-//!     48  4      from version 8 on: bytes n of the list of parts, u32 little-endian; 0 of a map file outside of a map's
-//!                folder
+//!     48  4      from version 8 on: bytes n of the list of parts, u32 little-endian; 0 of a map file outside of a
+//!                map's folder
 //!     52  4      from version 8 on: CRC-32C of the list of parts, u32 little-endian
 //!     56  n      the list of parts that the map's viewpoints lie in: `UsedViewpointParts` of
 //!                proto/mrol/store/v1/snapshot.proto, see `viewpoint_parts`
@@ -18,7 +18,8 @@
 //!                up to version 3
 //! ```
 //!
-//! The list of parts stands before the body, so that who asks which parts are needed reads only the start of the file.
+//! The list of parts stands before the body, so that finding out which parts are needed reads only the start of the
+//! file.
 //!
 //! `snapshot` is the map, `encoding` and `decoding` make bytes of it and it of bytes; `header`, `body` (which is read)
 //! and `writing` (by which a body is written) are parts of the file.

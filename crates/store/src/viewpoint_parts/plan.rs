@@ -68,7 +68,7 @@ impl ViewpointParts {
     }
 
     /// Notes that the snapshot of a plan was written; `written` is its new part.
-    pub(crate) fn tell_written(&mut self, plan: PartsPlan, written: Option<KnownPart>) {
+    pub(crate) fn note_written(&mut self, plan: PartsPlan, written: Option<KnownPart>) {
         self.parts = plan.kept.into_iter().map(|(part, _)| part).chain(written).collect();
     }
 

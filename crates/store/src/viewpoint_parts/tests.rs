@@ -55,7 +55,7 @@ impl Folder {
             self.written += part.stored.len();
         }
         self.known.use_up_number(&plan);
-        self.known.tell_written(plan, written);
+        self.known.note_written(plan, written);
     }
 
     fn load(&self) -> Result<ViewpointSet, StoreError> {

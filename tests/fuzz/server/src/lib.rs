@@ -1,4 +1,5 @@
-//! What is fuzzed of the server: functions of bytes that panic where a promise is broken. As those of files, in `../src`.
+//! What is fuzzed of the server: functions of bytes that panic where a promise is broken. As those of files, in
+//! `../src`.
 
 mod grpc;
 mod hosted;

@@ -26,7 +26,7 @@ struct Field {
 static TABLE: &[Elements] = include!(concat!(env!("OUT_DIR"), "/elements.rs"));
 
 /// Refuses a message, whose type is `name`, that has a list of more elements than `elements_max` says of the field; all
-/// lists of a field count together, since a message may have them in parts. What cannot be read is left to who decodes it:
+/// lists of a field count together, since a message may have them in parts. What cannot be read is left to the decoder:
 /// it comes as far as this and no further.
 pub(super) fn check(name: &str, bytes: &[u8], elements_max: impl Fn(&str) -> usize) -> Result<(), TooMany> {
     match Elements::of(name) {

@@ -1,7 +1,7 @@
 //! How many elements lists may have, whatever is set.
 //!
-//! These bound the memory for what is refused in the end. What a server answers is bounded by its settings, which are far
-//! below them.
+//! These bound the memory for what is refused in the end. What a server answers is bounded by its settings, which are
+//! far below them.
 
 /// Links of a body at most, whatever `body_parts_max` is.
 pub const LINKS_MAX: usize = 65_536;

@@ -109,7 +109,7 @@ impl From<pb::Failure> for pb::GridTile {
     }
 }
 
-/// A tile alone does not know whether it is the last one: who reads them counts.
+/// A tile alone does not say whether it is the last one: the reader counts.
 impl TryFrom<pb::GridTile> for GridTile {
     type Error = ServiceError;
 

@@ -1,4 +1,5 @@
-//! `mrol-lab experiment mapping`: measures time and growth scan by scan, by hash tables and by Bloom filters (paper IV-C).
+//! `mrol-lab experiment mapping`: measures time and growth scan by scan, by hash tables and by Bloom filters (paper
+//! IV-C).
 
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};

@@ -203,10 +203,12 @@ struct Agreement {
     /// True poses whose evidence suffices, of all.
     with_evidence: usize,
     scans: usize,
-    /// The smallest of the better shares at these, and the largest of the worse shares at wrong ones whose evidence suffices.
+    /// The smallest of the better shares at these, and the largest of the worse shares at wrong ones whose evidence
+    /// suffices.
     least_right: f64,
     most_wrong: f64,
-    /// The smallest better share of the true poses of all other sets, and how many true poses of this set lie below it; none without others.
+    /// The smallest better share of the true poses of all other sets, and how many true poses of this set lie below it;
+    /// none without others.
     from_others: Option<f64>,
     right_below: Option<usize>,
 }

@@ -16,8 +16,8 @@ const STEP_M: f64 = 0.4;
 /// Errors of odometry along an aisle: one standard deviation, meters and degrees.
 const ODOMETRY: (f64, f64) = (0.05, 2.0);
 
-/// A drive along an aisle with an upright every `period_m`, mapped at its true poses: the outcomes with odometry, and with the pose before
-/// as the guess. None where no map can be made.
+/// A drive along an aisle with an upright every `period_m`, mapped at its true poses: the outcomes with odometry, and
+/// with the pose before as the guess. None where no map can be made.
 pub fn aisle(seed: u64, period_m: f64, settings: &AlignmentSettings) -> Option<[Outcomes; 2]> {
     let mut outcomes = <[Outcomes; 2]>::default();
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,8 +1,9 @@
 //! Experiment on verdicts: wrong poses that are accepted and right ones that are refused, and how rays agree at both.
 //!
-//! Real scans with true poses are aligned to maps of one, two and half of them, from guesses at five distances; scans of other places
-//! too, which belong nowhere. Simulated places, drawn by seed, are those in which robots mistake themselves: rectangular rooms in which
-//! a robot was turned unseen, whose furniture was moved, or that are full of people, and aisles that repeat.
+//! Real scans with true poses are aligned to maps of one, two and half of them, from guesses at five distances; scans
+//! of other places too, which belong nowhere. Simulated places, drawn by seed, are those in which robots mistake
+//! themselves: rectangular rooms in which a robot was turned unseen, whose furniture was moved, or that are full of
+//! people, and aisles that repeat.
 
 mod aisles;
 mod outcomes;

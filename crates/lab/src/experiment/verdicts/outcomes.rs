@@ -25,7 +25,8 @@ pub struct Outcomes {
     pub refused: BTreeMap<&'static str, usize>,
     /// Why the true pose was refused, each time.
     pub refusals: Vec<String>,
-    /// Accepted at a wrong pose: how far off each is, meters and degrees (none of a scan of another place), and the reason that was given.
+    /// Accepted at a wrong pose: how far off each is, meters and degrees (none of a scan of another place), and the
+    /// reason that was given.
     pub wrong: Vec<(Option<(f64, f64)>, String)>,
     /// Refused at a wrong pose.
     pub lost: usize,

@@ -33,8 +33,8 @@ pub struct RoomTrials {
     pub rearranged: Outcomes,
     /// Of a scan after a step.
     pub stepped: Outcomes,
-    /// Voxels that the accepted ones of the scans in rooms that nobody changed took out of the map, where they were found and where they
-    /// were taken: all of them stand.
+    /// Voxels that the accepted ones of the scans in rooms that nobody changed took out of the map, where they were
+    /// found and where they were taken: all of them stand.
     pub carved: Carved,
     /// The largest share of the view that people hid.
     pub hidden: f64,
@@ -71,8 +71,8 @@ impl Carved {
     }
 }
 
-/// Rectangular rooms drawn from `seed`, mapped by eight scans; then the robot is turned unseen, so that the walls look the same, or goes
-/// on. None where no map can be made.
+/// Rectangular rooms drawn from `seed`, mapped by eight scans; then the robot is turned unseen, so that the walls look
+/// the same, or goes on. None where no map can be made.
 pub fn rooms(
     seed: u64,
     count: u64,

@@ -76,7 +76,8 @@ impl Set {
         Self { name: name.into(), place: place.into(), scans, resolution_m }
     }
 
-    /// A map of some of its scans at their true poses; none of settings out of range, or where no scan is left to align.
+    /// A map of some of its scans at their true poses; none of settings out of range, or where no scan is left to
+    /// align.
     pub fn trials(&self, which: MapOf) -> Option<Trials<'_>> {
         let count = self.scans.len();
         let (of_map, others): (Vec<_>, Vec<_>) =

@@ -1,4 +1,4 @@
-//! An attacker: it asks again as soon as it is answered.
+//! An attacker: it asks again as soon as it is answered, or soon after.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -40,9 +40,7 @@ impl Attacker {
             let failed = self.round(&mut connection, round).await.err();
             let refused = failed.is_some();
             self.tally.lock().count(begin.elapsed(), failed.map(|error| error.to_string()));
-            if refused {
-                sleep(AFTER_REFUSAL).await;
-            }
+            sleep(if refused { AFTER_REFUSAL } else { self.attack.pause() }).await;
         }
     }
 
@@ -100,6 +98,10 @@ impl Attacker {
                     .insert_scan(shared, made.garbage(robot(format!("garbage-{number}"))?))
                     .await
                     .map(drop)?;
+            }
+            Attack::LostRobots => {
+                let scan = made.elsewhere(robot(format!("lost-{number}"))?);
+                client.insert_scan(shared, scan).await.map(drop)?;
             }
             Attack::Listings | Attack::Counts | Attack::Watches | Attack::Connections => {}
         }

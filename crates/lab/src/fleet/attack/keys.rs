@@ -12,7 +12,7 @@ use mrol_service::AllowedMaps;
 /// Whose key it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Holder {
-    /// Who makes the maps.
+    /// The maker of the maps.
     Admin,
     /// The honest robot.
     Robot,
@@ -20,9 +20,9 @@ pub(crate) enum Holder {
     Planner,
     /// The honest operator.
     Operator,
-    /// An attacker who may read.
+    /// An attacker with scope `read`.
     Reader,
-    /// An attacker who may send scans.
+    /// An attacker with scope `insert`.
     Inserter,
 }
 

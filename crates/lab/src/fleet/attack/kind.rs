@@ -1,5 +1,7 @@
 //! The ways to attack.
 
+use std::time::Duration;
+
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
@@ -35,12 +37,14 @@ pub(crate) enum Attack {
     Connections,
     /// Watches of the honest callers' map
     Watches,
+    /// Two scans a second, each, of robots that are elsewhere and want to be looked for
+    LostRobots,
 }
 
 impl Attack {
     /// Scope of the key: true for `insert`, false for `read`.
     pub(super) fn inserts(self) -> bool {
-        matches!(self, Self::Scans | Self::TinyScans | Self::Garbage)
+        matches!(self, Self::Scans | Self::TinyScans | Self::Garbage | Self::LostRobots)
     }
 
     /// What it is called on the command line.
@@ -58,6 +62,15 @@ impl Attack {
             Self::Listings => 150,
             Self::Connections => 120,
             Self::Watches => 256,
+            Self::LostRobots => 4,
+        }
+    }
+
+    /// How long one that was answered waits before it asks again.
+    pub(super) fn pause(self) -> Duration {
+        match self {
+            Self::LostRobots => Duration::from_millis(500),
+            _ => Duration::ZERO,
         }
     }
 }

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::fleet::error::FleetError;
 use crate::fleet::robot::TURN_POINTS;
 use crate::workload::bodies::cart;
-use crate::workload::{Order, Room, Workload};
+use crate::workload::{Order, Room, Site, Workload};
 use mrol_client::new_session;
 use mrol_map::align::localize::LocalizationQuery;
 use mrol_map::geometry::{Point, Pose};
@@ -36,6 +36,8 @@ const POINTS: usize = 500_000;
 const ONE_IN: usize = 3;
 /// Points of a scan that no sensor saw.
 const GARBAGE_POINTS: usize = 20_000;
+/// Voxels of the place where lost robots are.
+const SITE_VOXELS: usize = 100_000;
 /// Points of a tiny scan.
 const TINY_POINTS: usize = 8;
 /// How far off a wrong guess is, meters along each axis: 0.8 m in all.
@@ -51,6 +53,7 @@ pub(super) struct Made {
     pub(super) points: ClassifyQuestion,
     pub(super) grid: GridQuestion,
     scan: PointCloud,
+    elsewhere: PointCloud,
     garbage: PointCloud,
     tiny: PointCloud,
     map_from_scan: Pose,
@@ -60,6 +63,7 @@ impl Made {
     pub(super) fn new(seed: u64) -> Result<Self, FleetError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let seen = Workload::Room(Room).queries(Order::Scan, TURN_POINTS, seed);
+        let site = Workload::Site(Site::of(SITE_VOXELS, seed)).queries(Order::Scan, TURN_POINTS, seed);
         let mut somewhere = |count: usize| (0..count).map(|_| anywhere(&mut random)).collect::<Vec<_>>();
         let [from, points, ends, garbage, tiny] =
             [MOTIONS, POINTS, RAYS, GARBAGE_POINTS, TINY_POINTS].map(&mut somewhere);
@@ -103,7 +107,8 @@ impl Made {
                     tells_unknown: true,
                 },
             },
-            scan: seen.points.into_iter().step_by(ONE_IN).collect::<Vec<_>>().into(),
+            scan: few_of(seen.points),
+            elsewhere: few_of(site.points),
             garbage: cloud(garbage),
             tiny: cloud(tiny),
             map_from_scan: seen.map_from_points,
@@ -123,6 +128,12 @@ impl Made {
             session: new_session(),
             ..ScanRequest::new(robot, self.scan.clone())
         }
+    }
+
+    /// A scan of another place, whose robot wants to be looked for.
+    pub(super) fn elsewhere(&self, robot: RobotName) -> ScanRequest {
+        let guess = Guess::Pose(self.map_from_scan);
+        ScanRequest { guess, recover: Some(true), ..ScanRequest::new(robot, self.elsewhere.clone()) }
     }
 
     /// Points that no sensor saw.
@@ -145,6 +156,11 @@ impl Made {
             time_limit: None,
         }
     }
+}
+
+/// A scan of some of a revolution's points.
+fn few_of(revolution: Vec<Point>) -> PointCloud {
+    revolution.into_iter().step_by(ONE_IN).collect::<Vec<_>>().into()
 }
 
 fn anywhere(random: &mut ChaCha8Rng) -> [f32; 3] {

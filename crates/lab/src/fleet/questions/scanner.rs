@@ -51,8 +51,8 @@ impl Scanner {
         })
     }
 
-    /// Inserts scans for `time`; how long each took. After each, one of `firsts` is asked, where there are some: how long
-    /// that took comes second.
+    /// Inserts scans for `time`; how long each took. After each, one of `firsts` is asked, where there are some: how
+    /// long that took comes second.
     pub(crate) async fn work(
         &mut self,
         server: &ServerProcess,

@@ -34,8 +34,8 @@ pub struct ArmPoses {
     pub field_bytes: usize,
 }
 
-/// Asks about an arm of 59 spheres in 11 links, or in 8 with a stiff hand, at `poses` random configurations within a meter of the map's surfaces, a bit each;
-/// `passes` times after the first.
+/// Asks about an arm of 59 spheres in 11 links, or in 8 with a stiff hand, at `poses` random configurations within a
+/// meter of the map's surfaces, a bit each; `passes` times after the first.
 ///
 /// # Errors
 /// When the map's voxels are too small for the arm.
@@ -61,8 +61,8 @@ pub fn arm_poses(
     Ok(ArmPoses { links: hand.links(), poses, colliding, first_ns: first.median(), runs, field_bytes })
 }
 
-/// Writes the map's voxels and the poses of [`arm_poses`] for programs of other libraries: the spheres of each, x y z and
-/// radius, and 0 where one meets a voxel.
+/// Writes the map's voxels and the poses of [`arm_poses`] for programs of other libraries: the spheres of each, x y z
+/// and radius, and 0 where one meets a voxel.
 ///
 /// # Errors
 /// When the map's voxels are too small for the arm, or the file cannot be written.

@@ -44,8 +44,8 @@ const POSES: usize = 5000;
 /// From one insertion to the next.
 const PERIOD: Duration = Duration::from_millis(100);
 
-/// Inserts `scans` scans of 20,000 points into the map of a workload, ten a second, while an arm's poses are asked about all
-/// the time, by one thread.
+/// Inserts `scans` scans of 20,000 points into the map of a workload, ten a second, while an arm's poses are asked
+/// about all the time, by one thread.
 ///
 /// # Errors
 /// When a setting is out of range, or the map's voxels are too small for the arm.

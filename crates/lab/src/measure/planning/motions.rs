@@ -31,8 +31,8 @@ pub(super) const MOTIONS: usize = 256;
 /// How far each goes, meters.
 const MOTION_M: f64 = 0.5;
 
-/// Asks about 256 motions of half a meter of a body of 20 spheres near the map's surfaces, of which half collide, in one
-/// question; `passes` times after one that is not timed.
+/// Asks about 256 motions of half a meter of a body of 20 spheres near the map's surfaces, of which half collide, in
+/// one question; `passes` times after one that is not timed.
 ///
 /// # Errors
 /// When the map's voxels are too small for the body.
@@ -50,7 +50,8 @@ pub fn motions(map: &Arc<MultiResolutionMap>, passes: usize, seed: u64) -> Resul
     Ok(Motions { motions, colliding, runs })
 }
 
-/// 256 motions of half a meter of which half collide, and how many do. On some maps one kind is rare: then there are fewer.
+/// 256 motions of half a meter of which half collide, and how many do. On some maps one kind is rare: then there are
+/// fewer.
 pub(crate) fn half_colliding(
     planner: &Planner,
     body: &Body,

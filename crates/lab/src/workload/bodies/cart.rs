@@ -45,8 +45,8 @@ pub(crate) fn motion(surface: &Surface, length_m: f64, random: &mut ChaCha8Rng) 
     numbers
 }
 
-/// What a sampling controller asks about in one cycle: `rollouts` ways from one place on, each of `steps` poses at random
-/// speeds and turns that change on the way.
+/// What a sampling controller asks about in one cycle: `rollouts` ways from one place on, each of `steps` poses at
+/// random speeds and turns that change on the way.
 pub(crate) fn rollouts(
     surface: &Surface,
     (rollouts, steps): (usize, usize),

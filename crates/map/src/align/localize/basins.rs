@@ -41,8 +41,8 @@ impl Basins {
         if self.found.len() < self.most { 0 } else { self.found.last().map_or(0, |basin| basin.score) }
     }
 
-    /// True when every pose within `distance_m` and `turn_rad` of `center` is the same place as one that scores at least
-    /// `bound`.
+    /// True when every pose within `distance_m` and `turn_rad` of `center` is the same place as one that scores at
+    /// least `bound`.
     pub(super) fn cover(&self, center: &Pose, distance_m: f64, turn_rad: f64, bound: u16) -> bool {
         self.found.iter().take_while(|basin| basin.score >= bound).any(|basin| {
             let between = basin.map_from_sensor.inv_mul(center);

@@ -5,7 +5,7 @@ use super::distance_field::DistanceField;
 use super::query::SearchBox;
 use super::sample::SearchSample;
 use super::settings::LocalizationSettings;
-use super::slabs::{BLOCKS_PER_LOOK, Slabs, VoxelBox};
+use super::slabs::{BLOCKS_PER_STOP_CHECK, Slabs, VoxelBox};
 use super::supervision::{Supervision, Unbuilt, check};
 use crate::geometry::translation_m;
 use crate::map::{ContentVersion, MultiResolutionMap};
@@ -34,7 +34,7 @@ const LEVEL_MAX: f64 = 20.0;
 /// Number of temporary grids, one byte a voxel, that exist while a field is built.
 const GRIDS_BESIDE: usize = 2;
 /// Poses of a trajectory between two checks of the stop signal.
-const POSES_PER_LOOK: usize = 16 << 10;
+const POSES_PER_STOP_CHECK: usize = 16 << 10;
 
 /// Blocks of one revision of a map, in no particular order.
 struct Blocks {
@@ -51,7 +51,7 @@ impl Blocks {
         let view = read.view();
         let mut blocks = Vec::with_capacity(count);
         for (block, mask) in view.lists(0).flat_map(|list| list.blocks().iter()) {
-            if blocks.len().is_multiple_of(BLOCKS_PER_LOOK) {
+            if blocks.len().is_multiple_of(BLOCKS_PER_STOP_CHECK) {
                 check(stop)?;
             }
             blocks.push((block, *mask));
@@ -73,7 +73,7 @@ impl Blocks {
             let index = key.index();
             (0..3).all(|axis| (low[axis] >> level..=high[axis] >> level).contains(&index[axis]))
         };
-        for blocks in self.blocks.chunks(BLOCKS_PER_LOOK) {
+        for blocks in self.blocks.chunks(BLOCKS_PER_STOP_CHECK) {
             check(stop)?;
             for (block, mask) in blocks {
                 let voxels = mask.cells(in_block).map(|cell| cell.voxel(*block).ancestor(level));
@@ -89,8 +89,8 @@ impl DilatedLevels {
     /// of the map and around its trajectory.
     ///
     /// # Errors
-    /// When the map has no voxel there, or too many for [`LocalizationSettings::grid_bytes_max`]; when there is no memory
-    /// for them, or they were stopped.
+    /// When the map has no voxel there, or too many for [`LocalizationSettings::grid_bytes_max`]; when there is no
+    /// memory for them, or they were stopped.
     pub(super) fn of(
         map: &MultiResolutionMap,
         sample: &SearchSample,
@@ -177,7 +177,7 @@ fn around_trajectory(
     let trajectory = map.trajectory().clone();
     let mut around = bulk;
     for (i, pose) in trajectory.poses().enumerate() {
-        if i.is_multiple_of(POSES_PER_LOOK) {
+        if i.is_multiple_of(POSES_PER_STOP_CHECK) {
             check(stop)?;
         }
         around = around.holding(translation_m(&pose.map_from_sensor));

@@ -56,7 +56,7 @@ impl DistanceField {
             (far_everywhere(self.distances.len(), stop)?, far_everywhere(self.distances.len(), stop)?);
         for _ in 0..DISTANCE_MAX {
             for (from, distances) in
-                from.chunks_mut(CELLS_PER_LOOK).zip(self.distances.chunks(CELLS_PER_LOOK))
+                from.chunks_mut(CELLS_PER_STOP_CHECK).zip(self.distances.chunks(CELLS_PER_STOP_CHECK))
             {
                 check(stop)?;
                 from.copy_from_slice(distances);
@@ -66,7 +66,7 @@ impl DistanceField {
                 std::mem::swap(&mut from, &mut to);
             }
             for (distances, from) in
-                self.distances.chunks_mut(CELLS_PER_LOOK).zip(from.chunks(CELLS_PER_LOOK))
+                self.distances.chunks_mut(CELLS_PER_STOP_CHECK).zip(from.chunks(CELLS_PER_STOP_CHECK))
             {
                 check(stop)?;
                 for (distance, nearest) in distances.iter_mut().zip(from) {
@@ -94,7 +94,7 @@ impl DistanceField {
     /// About `wish` of the occupied voxels, at even distances in the order of their keys.
     pub(super) fn some_occupied(&self, wish: usize, stop: StopSignal<'_>) -> Result<Vec<VoxelKey>, Unbuilt> {
         let mut occupied = 0;
-        for distances in self.distances.chunks(CELLS_PER_LOOK) {
+        for distances in self.distances.chunks(CELLS_PER_STOP_CHECK) {
             check(stop)?;
             occupied += distances.iter().filter(|&&distance| distance == 0).count();
         }
@@ -103,7 +103,7 @@ impl DistanceField {
         let [xs, ys, zs] = std::array::from_fn(|axis| self.in_order_of_keys(axis));
         for (z, y) in zs.flat_map(|z| ys.clone().map(move |y| (z, y))) {
             since_look += self.size[0];
-            if since_look >= CELLS_PER_LOOK {
+            if since_look >= CELLS_PER_STOP_CHECK {
                 since_look = 0;
                 check(stop)?;
             }
@@ -225,14 +225,14 @@ fn whole(place: f32, last: f32) -> u32 {
 }
 
 /// Cells of a grid between two checks of the stop signal: a fraction of a millisecond.
-const CELLS_PER_LOOK: usize = 1 << 20;
+const CELLS_PER_STOP_CHECK: usize = 1 << 20;
 
 /// A grid of `cells` voxels, all of them [`FAR`].
 fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt> {
     let mut distances = Vec::with_capacity(cells);
     while distances.len() < cells {
         check(stop)?;
-        distances.resize(cells.min(distances.len() + CELLS_PER_LOOK), FAR);
+        distances.resize(cells.min(distances.len() + CELLS_PER_STOP_CHECK), FAR);
     }
     Ok(distances)
 }
@@ -240,9 +240,9 @@ fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt
 /// The smallest of each value and its neighbors a `stride` away; the ends of the grid are border.
 fn smallest_of_three(from: &[u8], stride: usize, to: &mut [u8], stop: StopSignal<'_>) -> Result<(), Unbuilt> {
     let inner = from.len() - 2 * stride;
-    for start in (0..inner).step_by(CELLS_PER_LOOK) {
+    for start in (0..inner).step_by(CELLS_PER_STOP_CHECK) {
         check(stop)?;
-        let end = inner.min(start + CELLS_PER_LOOK);
+        let end = inner.min(start + CELLS_PER_STOP_CHECK);
         let neighbors = from[start..end].iter().zip(&from[start + stride..]).zip(&from[start + 2 * stride..]);
         for (smallest, ((a, b), c)) in to[start + stride..].iter_mut().zip(neighbors) {
             *smallest = *a.min(b).min(c);

@@ -22,7 +22,7 @@ const APART_DEG: f64 = 20.0;
 /// Least share of the surfaces that a dominant direction has.
 const SHARE_MIN: f64 = 0.04;
 /// Surfaces that are fitted, or compared with all others, between two checks of the stop signal.
-const SURFACES_PER_LOOK: usize = 64;
+const SURFACES_PER_STOP_CHECK: usize = 64;
 
 /// Up to `wish` dominant normals (without sign) of the surfaces around `voxels`, at most [`SURFACES_MAX`] of them; most
 /// frequent first.
@@ -33,7 +33,7 @@ pub(super) fn dominant_normals(
     stop: StopSignal<'_>,
 ) -> Result<Vec<UnitVector3<f64>>, Unbuilt> {
     let mut normals: Vec<Vector3<f64>> = Vec::new();
-    for voxels in voxels.chunks(SURFACES_PER_LOOK) {
+    for voxels in voxels.chunks(SURFACES_PER_STOP_CHECK) {
         check(stop)?;
         normals.extend(voxels.iter().filter_map(|voxel| normal_at(*voxel, is_occupied)));
     }
@@ -43,7 +43,7 @@ pub(super) fn dominant_normals(
         let support = |axis: &Vector3<f64>| normals.iter().filter(|n| are_near(n, axis, SAME_DEG)).count();
         // The first of the best, so that the order of voxels decides ties.
         let mut supports = Vec::with_capacity(normals.len());
-        for normals in normals.chunks(SURFACES_PER_LOOK) {
+        for normals in normals.chunks(SURFACES_PER_STOP_CHECK) {
             check(stop)?;
             supports.extend(normals.iter().map(|axis| (support(axis), *axis)));
         }

@@ -59,7 +59,7 @@ const MAP_DIRECTIONS: usize = 2;
 /// Number of dominant normals of the scan that are tried; most scans have no more.
 const SCAN_DIRECTIONS: usize = 4;
 /// Points of a scan that are quantized between two checks of the stop signal.
-const POINTS_PER_LOOK: usize = 16 << 10;
+const POINTS_PER_STOP_CHECK: usize = 16 << 10;
 
 impl Orientations {
     /// The families of a search: one about the direction of gravity where it is known. Otherwise those that bring one
@@ -107,7 +107,7 @@ fn voxels_of(
 ) -> Result<BTreeSet<(VoxelKey, Cell)>, Unbuilt> {
     let mut voxels = BTreeSet::new();
     let Ok(lattice) = Lattice::new(resolution_m, 1) else { return Ok(voxels) };
-    for points in points.chunks(POINTS_PER_LOOK) {
+    for points in points.chunks(POINTS_PER_STOP_CHECK) {
         check(stop)?;
         let some = VoxelSet::of_points(points, &lattice.from_map()).0;
         voxels.extend(some.iter().map(|voxel| Cell::of(voxel.index())));

@@ -36,7 +36,7 @@ const LOSS_PER_HALVING: f64 = 0.04;
 const CELLS_PER_REPORT: u32 = 64;
 /// Groups of eight cells that are bounded between two checks of the stop signal. Each group takes eight look-ups a
 /// search point; together they take a millisecond or less.
-const EIGHTS_PER_LOOK: u32 = 64;
+const EIGHTS_PER_STOP_CHECK: u32 = 64;
 
 /// Initial capacity of the queue, in cells.
 const ROOM_AT_FIRST: usize = 1024;
@@ -149,7 +149,7 @@ impl<'a, 's> Search<'a, 's> {
     /// Computes the bounds of `first` and its seven siblings, and queues those that may hold a better place.
     fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) -> ControlFlow<()> {
         self.since_look += 1;
-        if self.since_look >= EIGHTS_PER_LOOK {
+        if self.since_look >= EIGHTS_PER_STOP_CHECK {
             self.look()?;
         }
         let floor = self.floor();

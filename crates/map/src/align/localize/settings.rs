@@ -16,7 +16,8 @@ pub struct LocalizationSettings {
     pub gravity_tolerance_deg: f64,
     /// Largest error of a surface normal, degrees, where rotations are derived from surfaces. 3.
     pub surface_tolerance_deg: f64,
-    /// Least share of the search points that fall on the dilated map for a pose to be considered: half of a scan may show what nobody saw. 0.4.
+    /// Least share of the search points that fall on the dilated map for a pose to be considered: half of a scan may
+    /// show what nobody saw. 0.4.
     pub search_overlap_min: f64,
     /// Least share of the best pose's search points for a pose to be considered. Another place can be mistaken for the
     /// best only above it. 0.9.

@@ -8,7 +8,7 @@ use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, VoxelKey};
 pub(super) type VoxelBox = ([i32; 3], [i32; 3]);
 
 /// Blocks that are counted between two checks of the stop signal.
-pub(super) const BLOCKS_PER_LOOK: usize = 16 << 10;
+pub(super) const BLOCKS_PER_STOP_CHECK: usize = 16 << 10;
 
 /// Number of finest voxels in each slab of blocks, axis by axis.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ impl Slabs {
     /// Counts the slabs of the blocks of a map, of which there is at least one.
     pub(super) fn of(blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Result<Self, Unbuilt> {
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
-        for blocks in blocks.chunks(BLOCKS_PER_LOOK) {
+        for blocks in blocks.chunks(BLOCKS_PER_STOP_CHECK) {
             check(stop)?;
             for (block, _) in blocks {
                 let index = block.index();
@@ -33,7 +33,7 @@ impl Slabs {
         }
         let slabs = |axis: usize| vec![0; (high[axis] - low[axis] + 1).max(0) as usize];
         let mut counted = Self { first: low, counts: std::array::from_fn(slabs), voxels: 0 };
-        for blocks in blocks.chunks(BLOCKS_PER_LOOK) {
+        for blocks in blocks.chunks(BLOCKS_PER_STOP_CHECK) {
             check(stop)?;
             for (block, mask) in blocks {
                 let (index, count) = (block.index(), mask.count(0));

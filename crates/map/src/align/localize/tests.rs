@@ -10,7 +10,7 @@ use crate::util::StopSignal;
 use crate::voxel::sample_bytes_max;
 
 /// Cells of a grid or points that are visited between two looks, at most.
-const WORK_PER_LOOK: u64 = 8 << 20;
+const WORK_PER_STOP_CHECK: u64 = 8 << 20;
 
 fn record(points: &[Point], map: &MultiResolutionMap) -> ScanRecord {
     let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
@@ -152,7 +152,7 @@ fn a_larger_map_and_a_larger_scan_are_looked_at_as_much_oftener() {
     };
     for (repeats, apart_m) in [(1, 5.0), (4, 20.0), (8, 20.0)] {
         let work = searched(repeats, apart_m);
-        assert!(work <= WORK_PER_LOOK, "{work} units between two looks, {repeats} times the scan");
+        assert!(work <= WORK_PER_STOP_CHECK, "{work} units between two looks, {repeats} times the scan");
     }
 }
 

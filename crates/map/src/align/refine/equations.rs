@@ -10,7 +10,7 @@ use crate::util::StopSignal;
 
 /// Points that are matched between two checks of the stop signal: a millisecond, where none of their voxels was read
 /// before.
-pub(super) const POINTS_PER_LOOK: usize = 256;
+pub(super) const POINTS_PER_STOP_CHECK: usize = 256;
 
 /// Normal equations of a Gauss-Newton step: the sum of what all matched points say of how the pose should change.
 ///
@@ -21,13 +21,8 @@ pub(super) struct NormalEquations {
     hessian: Matrix6<f64>,
     /// Sum of J^T W e.
     gradient: Vector6<f64>,
-    points: usize,
     /// Number of points that have a Gaussian.
-    pub(super) matched: usize,
-    /// Number of points within the robust scale of their Gaussian.
-    pub(super) inliers: usize,
-    /// Sum of the weights of the matched points; the weight is 1 for a point on its surface.
-    fitness: f64,
+    matched: usize,
 }
 
 impl NormalEquations {
@@ -42,19 +37,10 @@ impl NormalEquations {
         robust_scale: f64,
         stop: StopSignal<'_>,
     ) -> Self {
-        let mut equations = Self {
-            hessian: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
-            points: points.len(),
-            matched: 0,
-            inliers: 0,
-            fitness: 0.0,
-        };
+        let mut equations = Self { hessian: Matrix6::zeros(), gradient: Vector6::zeros(), matched: 0 };
         for_each_match(points, pose, gaussians, moments, (robust_scale, stop), |_, gaussian, matched| {
             let weight = matched.fit * matched.fit;
             equations.matched += 1;
-            equations.inliers += usize::from(matched.is_inlier);
-            equations.fitness += matched.fit;
             equations.hessian += hessian(&matched.from_sensor, &(gaussian.information() * weight));
             let pull = gaussian.information() * matched.error * weight;
             equations.pull(&matched.from_sensor, &pull);
@@ -76,34 +62,55 @@ impl NormalEquations {
         (self.matched > 0).then_some(())?;
         Some(Step(-damped.cholesky()?.solve(&self.gradient)))
     }
-
-    /// Mean weight of all points, 0 to 1: 1 where every point lies on a surface; a point without a Gaussian adds 0.
-    pub(super) fn fitness(&self) -> f64 {
-        self.fitness / self.points.max(1) as f64
-    }
 }
 
-/// The information matrix (inverse covariance) of a pose at which points lie on surfaces.
-///
-/// The points of one voxel average their noise, but share what is wrong with its Gaussian: together they are one
-/// measurement with the variance of the Gaussian's floor and an n-th of its thickness.
-pub(super) fn information(
-    points: &[Point],
-    pose: &Pose,
-    gaussians: &mut VoxelGaussians,
-    moments: &KnownMoments<'_>,
-    robust_scale: f64,
-    stop: StopSignal<'_>,
-) -> Matrix6<f64> {
-    let mut surfaces: Vec<(f64, Matrix6<f64>)> = Vec::new();
-    for_each_match(points, pose, gaussians, moments, (robust_scale, stop), |number, gaussian, matched| {
-        surfaces.resize(surfaces.len().max(number + 1), (0.0, Matrix6::zeros()));
-        let (count, sum) = &mut surfaces[number];
-        *count += 1.0;
-        *sum += hessian(&matched.from_sensor, &(gaussian.information() * (matched.fit * matched.fit)));
-    });
-    let held = surfaces.iter().enumerate().filter(|(_, (count, _))| *count > 0.0);
-    held.map(|(number, (count, sum))| sum * (gaussians.get(number as u32).averaging(*count) / count)).sum()
+/// What points say of a pose by the surfaces that they lie on.
+#[derive(Debug, Clone)]
+pub(super) struct MatchedPoints {
+    /// The information matrix (inverse covariance) of the pose.
+    ///
+    /// The points of one voxel average their noise, but share what is wrong with its Gaussian: together they are one
+    /// measurement with the variance of the Gaussian's floor and an n-th of its thickness.
+    pub(super) information: Matrix6<f64>,
+    /// Number of points within the robust scale of their Gaussian.
+    pub(super) inliers: usize,
+    /// Sum of the points' weights: a point on its surface adds 1, one without a Gaussian 0.
+    pub(super) weight: f64,
+}
+
+impl MatchedPoints {
+    /// What `points` (sensor frame) say of `pose`. Once stopped, the result is meaningless.
+    pub(super) fn of(
+        points: &[Point],
+        pose: &Pose,
+        gaussians: &mut VoxelGaussians,
+        moments: &KnownMoments<'_>,
+        robust_scale: f64,
+        stop: StopSignal<'_>,
+    ) -> Self {
+        let mut surfaces: Vec<(f64, Matrix6<f64>)> = Vec::new();
+        let (mut inliers, mut weight) = (0, 0.0);
+        for_each_match(
+            points,
+            pose,
+            gaussians,
+            moments,
+            (robust_scale, stop),
+            |number, gaussian, matched| {
+                inliers += usize::from(matched.is_inlier);
+                weight += matched.fit;
+                surfaces.resize(surfaces.len().max(number + 1), (0.0, Matrix6::zeros()));
+                let (count, sum) = &mut surfaces[number];
+                *count += 1.0;
+                *sum +=
+                    hessian(&matched.from_sensor, &(gaussian.information() * (matched.fit * matched.fit)));
+            },
+        );
+        let held = surfaces.iter().enumerate().filter(|(_, (count, _))| *count > 0.0);
+        let averaging = |number: usize, count: f64| gaussians.get(number as u32).averaging(count) / count;
+        let information = held.map(|(number, (count, sum))| sum * averaging(number, *count)).sum();
+        Self { information, inliers, weight }
+    }
 }
 
 /// A point and the Gaussian that it belongs to.
@@ -129,7 +136,7 @@ fn for_each_match(
     let rotation = pose.rotation.to_rotation_matrix();
     let scale = robust_scale * robust_scale;
     for (place, point) in points.iter().enumerate() {
-        if place.is_multiple_of(POINTS_PER_LOOK) && stop.is_stopped() {
+        if place.is_multiple_of(POINTS_PER_STOP_CHECK) && stop.is_stopped() {
             return;
         }
         let from_sensor = rotation * point.to_f64().coords;

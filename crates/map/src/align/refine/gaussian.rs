@@ -60,7 +60,8 @@ impl Gaussian {
         })
     }
 
-    /// Adds an uncertainty of `softness.std_m` in every direction to the surface's own spread, in place of what was added before.
+    /// Adds an uncertainty of `softness.std_m` in every direction to the surface's own spread, in place of what was
+    /// added before.
     #[inline]
     pub(super) fn soften(&mut self, softness: Softness) {
         if self.softness != softness {

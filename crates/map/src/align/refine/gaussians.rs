@@ -11,22 +11,35 @@ use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
 /// surface, the larger ones, which are sums of them, may.
 const SIZES: usize = 3;
 
-/// The Gaussians of a map's voxels near a scan, computed on demand and kept for one alignment, with all its ends. The map may
-/// change meanwhile; a Gaussian that is kept stays as it was.
+/// The Gaussians of a map's voxels near a scan, computed on demand and kept for one alignment, with all its ends. The
+/// map may change meanwhile; a Gaussian that is kept stays as it was.
 #[derive(Debug)]
 pub(in crate::align) struct VoxelGaussians {
     resolution_m: f64,
     /// How soft they are where they are looked up.
     softness: Softness,
     sizes: [HashMap<VoxelKey, Option<u32>>; SIZES],
+    /// By octants of the smallest voxels: in one of them all points lie in the same voxels, and next to the same
+    /// neighbors.
+    near: HashMap<VoxelKey, Near>,
     gaussians: Vec<Gaussian>,
 }
+
+/// Indices of the Gaussians that a point may belong to, the present ones first: one of its own voxel, or up to three of
+/// neighbors.
+type Near = [Option<u32>; 3];
 
 impl VoxelGaussians {
     /// None yet, of a map whose finest voxels have sides of `resolution_m`.
     pub(in crate::align) fn new(resolution_m: f64) -> Self {
         let softness = Softness { std_m: 0.0, spread: 0.0 };
-        Self { resolution_m, softness, sizes: Default::default(), gaussians: Vec::new() }
+        Self {
+            resolution_m,
+            softness,
+            sizes: Default::default(),
+            near: HashMap::new(),
+            gaussians: Vec::new(),
+        }
     }
 
     /// Softens those that are looked up from now on; see [`Gaussian::soften`].
@@ -43,43 +56,65 @@ impl VoxelGaussians {
     /// failing that, of the neighbors across its nearest faces; then the same for larger voxels. (Otherwise a surface
     /// on the border of two voxels would attract only the points on its own side.)
     pub(super) fn nearest(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>) -> Option<u32> {
-        (0..SIZES).find_map(|size| self.nearest_of(moments, point_m, size))
-    }
-
-    fn nearest_of(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
-        let scaled = point_m / self.side_m(size);
-        let index = scaled.map(|c| c.floor() as i32);
-        if let Some(own) = self.of_voxel(moments, index.into(), size) {
-            return Some(own);
-        }
+        let octant = (point_m / (self.side_m(0) / 2.0)).map(|c| c.floor() as i32);
+        let octant = VoxelKey::new(octant.into())?;
+        let near = match self.near.get(&octant) {
+            Some(known) => *known,
+            None => {
+                let near = (0..SIZES).map(|size| self.near_of(moments, point_m, size));
+                let near = near.into_iter().find(|near| near[0].is_some()).unwrap_or_default();
+                self.near.insert(octant, near);
+                near
+            }
+        };
         let mut nearest = None;
-        for axis in 0..3 {
-            let mut neighbor = index;
-            let side = if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
-            neighbor[axis] = index[axis].saturating_add(side);
-            if let Some(i) = self.of_voxel(moments, neighbor.into(), size) {
-                let distance = self.get(i).distance_squared(point_m);
-                if nearest.is_none_or(|(_, least)| distance < least) {
-                    nearest = Some((i, distance));
-                }
+        for i in near.into_iter().flatten() {
+            let gaussian = &mut self.gaussians[i as usize];
+            gaussian.soften(self.softness);
+            if near[1].is_none() {
+                return Some(i);
+            }
+            let distance = gaussian.distance_squared(point_m);
+            if nearest.is_none_or(|(_, least)| distance < least) {
+                nearest = Some((i, distance));
             }
         }
         nearest.map(|(i, _)| i)
     }
 
+    /// Indices of the Gaussians that a point may belong to in voxels of a size: its own voxel's or, failing that, the
+    /// neighbors'.
+    fn near_of(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>, size: usize) -> Near {
+        let scaled = point_m / self.side_m(size);
+        let index = scaled.map(|c| c.floor() as i32);
+        let own = self.of_voxel(moments, index.into(), size);
+        if own.is_some() {
+            return [own, None, None];
+        }
+        let mut neighbors = Near::default();
+        let mut count = 0;
+        for axis in 0..3 {
+            let mut neighbor = index;
+            let side = if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
+            neighbor[axis] = index[axis].saturating_add(side);
+            if let Some(i) = self.of_voxel(moments, neighbor.into(), size) {
+                neighbors[count] = Some(i);
+                count += 1;
+            }
+        }
+        neighbors
+    }
+
     fn of_voxel(&mut self, moments: &KnownMoments<'_>, index: [i32; 3], size: usize) -> Option<u32> {
         let voxel = VoxelKey::new(index)?;
         if let Some(&known) = self.sizes[size].get(&voxel) {
-            let gaussian = known.and_then(|i| self.gaussians.get_mut(i as usize));
-            gaussian.into_iter().for_each(|gaussian| gaussian.soften(self.softness));
             return known;
         }
         let side_m = self.side_m(size);
         let center_m = Vector3::from(index.map(|i| (f64::from(i) + 0.5) * side_m));
         let unit_m = self.side_m(0) / Moments::UNITS as f64;
         let gaussian = Gaussian::of(&moments_of(moments, index, size), center_m, side_m, unit_m);
-        let number = gaussian.map(|mut gaussian| {
-            gaussian.soften(self.softness);
+        let number = gaussian.map(|gaussian| {
             self.gaussians.push(gaussian);
             self.gaussians.len() as u32 - 1
         });

@@ -3,8 +3,8 @@
 use crate::map::{MomentsView, MultiResolutionMap};
 use crate::voxel::{Moments, VoxelKey};
 
-/// The moments of a map's points; of one that keeps none, those of the centers of its finest voxels, as they are when they
-/// are asked for.
+/// The moments of a map's points; of one that keeps none, those of the centers of its finest voxels, as they are when
+/// they are asked for.
 #[derive(Debug)]
 pub(super) struct KnownMoments<'a> {
     map: &'a MultiResolutionMap,

@@ -1,6 +1,6 @@
 //! Refinement of a pose, and how well points lie on the map's surfaces.
 
-use super::equations::{NormalEquations, information};
+use super::equations::{MatchedPoints, NormalEquations};
 use super::gaussian::Softness;
 use super::gaussians::VoxelGaussians;
 use super::known_moments::KnownMoments;
@@ -39,7 +39,8 @@ pub(in crate::align) struct SurfaceFit {
     pub(in crate::align) fitness: f64,
 }
 
-/// Moves the sensor to where `points` (sensor frame, finite) lie on the surfaces of the map, from a guess a few r_0 off.
+/// Moves the sensor to where `points` (sensor frame, finite) lie on the surfaces of the map, from a guess a few r_0
+/// off.
 ///
 /// Surfaces are soft at first and harden from stage to stage, so that points find theirs from afar.
 pub(in crate::align) fn refine(
@@ -97,13 +98,12 @@ pub(in crate::align) fn surface_fit(
 ) -> SurfaceFit {
     let std_m = settings.std_m(map.lattice().resolution_m(0));
     gaussians.soften(Softness { std_m, spread: SPREAD_TO_JUDGE });
-    let scale = settings.robust_scale;
-    let equations =
-        NormalEquations::of(points, map_from_sensor, gaussians, &KnownMoments::of(map), scale, stop);
-    let information = information(points, map_from_sensor, gaussians, &KnownMoments::of(map), scale, stop);
+    let (moments, scale) = (KnownMoments::of(map), settings.robust_scale);
+    let matched = MatchedPoints::of(points, map_from_sensor, gaussians, &moments, scale, stop);
+    let count = points.len().max(1) as f64;
     SurfaceFit {
-        information: PoseInformation::new(information, points),
-        inliers: equations.inliers as f64 / points.len().max(1) as f64,
-        fitness: equations.fitness(),
+        information: PoseInformation::new(matched.information, points),
+        inliers: matched.inliers as f64 / count,
+        fitness: matched.weight / count,
     }
 }

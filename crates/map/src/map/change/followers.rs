@@ -1,17 +1,17 @@
-//! Who follows which blocks of a map change: structures that are derived of the voxels, and are to be mended where those
-//! changed.
+//! Followers of the blocks of a map that change: structures that are derived of the voxels, and are to be mended where
+//! those changed.
 
 use std::sync::Arc;
 
 use crate::sync::{Mutex, Rank};
 use crate::voxel::{BlockMask, VoxelKey};
 
-/// Blocks that a follower's queue holds; 72 bytes each. Beyond that it is told that everything may have changed, and until
-/// it asks, no change costs anything for it.
+/// Blocks that a follower's queue holds; 72 bytes each. Beyond that it is told that everything may have changed, and
+/// until it asks, no change costs anything for it.
 const QUEUE_BLOCKS_MAX: usize = 64 << 10;
 
-/// The blocks that changed, tier by tier: those of tier t are 8 x 8 x 8 voxels of level 3 t, and `changed` says which of
-/// these came or went.
+/// The blocks that changed, tier by tier: those of tier t are 8 x 8 x 8 voxels of level 3 t, and `changed` says which
+/// of these came or went.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TouchedBlocks {
     /// Each block with the voxels that changed, at each tier.

@@ -9,8 +9,8 @@ use crate::map::name::{CallerName, RequestId};
 /// Requests that a map remembers, those of all callers together.
 pub const REQUESTS_KEPT: usize = 65_536;
 
-/// Requests of one caller with a name that a map remembers: one more displaces the caller's own oldest. Those of callers
-/// without a name, as all of a server without keys are, share [`REQUESTS_KEPT`] with the others.
+/// Requests of one caller with a name that a map remembers: one more displaces the caller's own oldest. Those of
+/// callers without a name, as all of a server without keys are, share [`REQUESTS_KEPT`] with the others.
 pub const REQUESTS_PER_CALLER_KEPT: usize = 8_192;
 
 /// A change that was asked for under an id, and what came of it.
@@ -38,9 +38,9 @@ pub struct CompletedRequest {
 
 /// The last answered requests of each caller, in the order of their revisions.
 ///
-/// A caller with a name has [`REQUESTS_PER_CALLER_KEPT`] at most, so that nobody's requests displace those of others. Where
-/// [`REQUESTS_KEPT`] are remembered all the same, the oldest goes of the caller that has most: who asks for little keeps
-/// all of it.
+/// A caller with a name has [`REQUESTS_PER_CALLER_KEPT`] at most, so that nobody's requests displace those of others.
+/// Where [`REQUESTS_KEPT`] are remembered all the same, the oldest goes of the caller that has most: who asks for
+/// little keeps all of it.
 #[derive(Debug, Clone, Default)]
 pub struct IdempotencyLog {
     /// By the revision that each made.
@@ -53,7 +53,8 @@ pub struct IdempotencyLog {
 /// Whose id it is, and for what: callers do not know of each other's ids.
 type Key = (Option<CallerName>, RequestKind, RequestId);
 
-/// What was asked for. Ids of one kind say nothing of those of another: who may undo scans is not always who may delete.
+/// What was asked for. Ids of one kind say nothing of those of another: who may undo scans is not always who may
+/// delete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RequestKind {
     /// Voxels taken out.
@@ -90,8 +91,8 @@ impl CompletedRequest {
 }
 
 impl IdempotencyLog {
-    /// What came of the caller's request of that kind and id. Requests of which nobody noted the caller, as those of a server
-    /// that had no keys then, are everybody's.
+    /// What came of the caller's request of that kind and id. Requests of which nobody noted the caller, as those of a
+    /// server that had no keys then, are everybody's.
     pub fn find(
         &self,
         kind: RequestKind,
@@ -107,8 +108,8 @@ impl IdempotencyLog {
         self.answered.values()
     }
 
-    /// Remembers a request in place of an older one of its caller, kind and id. No server answers an id that it remembers, but a
-    /// journal may have been written by one that remembered fewer.
+    /// Remembers a request in place of an older one of its caller, kind and id. No server answers an id that it
+    /// remembers, but a journal may have been written by one that remembered fewer.
     pub(in crate::map) fn push(&mut self, request: CompletedRequest) {
         let (caller, revision) = (request.caller.clone(), request.revision);
         if let Some(older) = self.by_id.insert(request.key(), revision) {

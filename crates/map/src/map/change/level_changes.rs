@@ -1,4 +1,4 @@
-//! What a change does to chosen levels, for who watches them.
+//! What a change does to chosen levels, for their watchers.
 
 use crate::voxel::{VoxelKey, VoxelSet};
 

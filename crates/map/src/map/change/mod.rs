@@ -1,8 +1,8 @@
 //! Changes: what one revision did to a map, and what a map keeps of its changes.
 //!
 //! `records` are the changes themselves, `committed` what one came to. A map keeps the answers to requests
-//! (`idempotency_log`), its newest revision (`published`) and who follows its blocks (`followers`); `level_changes` are
-//! noted for those who watch levels. How a change is made is in [`super::commit`].
+//! (`idempotency_log`), its newest revision (`published`) and the followers of its blocks (`followers`);
+//! `level_changes` are noted for those who watch levels. How a change is made is in [`super::commit`].
 
 mod committed;
 mod followers;

@@ -8,7 +8,7 @@ use crate::sync::AtomicU64;
 /// The newest revision of a map and its content hash, which are read together without a lock.
 ///
 /// The hashes of even and odd revisions have a place each: whoever publishes a revision writes where that of the one
-/// before last was, so that nobody who reads the present one reads half of it.
+/// before last was, so that no reader of the present one reads half of it.
 #[derive(Debug)]
 pub(in crate::map) struct Published {
     revision: AtomicU64,

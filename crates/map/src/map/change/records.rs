@@ -31,7 +31,8 @@ pub struct DeletionRecord {
 
 /// Scans and deletions that were taken back.
 ///
-/// The map after it is what replaying all other changes would give, with the deletions and what scans carved as they were.
+/// The map after it is what replaying all other changes would give, with the deletions and what scans carved as they
+/// were.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct UndoRecord {
     /// The revisions that the scans had made, ascending.

@@ -8,7 +8,8 @@ use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};
 /// Cache misses that are under way at once.
 const AT_ONCE: usize = 32;
 
-/// Calls `f(change, voxels there)` for each block that changes: what leads to the next of them is fetched in three steps.
+/// Calls `f(change, voxels there)` for each block that changes: what leads to the next of them is fetched in three
+/// steps.
 pub(super) fn find_each(
     table: &ClusterTable,
     changes: &[BlockChange<'_>],

@@ -152,10 +152,10 @@ impl<'a> Committer<'a> {
         Some(self.publish(made))
     }
 
-    /// Takes changes back: the scans leave the trajectory, what they alone held goes, and what they or deletions took away
-    /// comes back. Always makes a revision.
+    /// Takes changes back: the scans leave the trajectory, what they alone held goes, and what they or deletions took
+    /// away comes back. Always makes a revision.
     fn undo(self, undo: &UndoRecord, stop: StopSignal<'_>) -> Option<Made> {
-        // All shards, so that nobody who has a view of the whole map sees the trajectory change.
+        // All shards, so that no view of the whole map sees the trajectory change.
         let mut update = self.plan_in(&undo.removed, &undo.restored, 0..SHARDS, stop)?;
         let made = self.next(&mut update);
         let known = self.grouped(&undo.moments);
@@ -170,8 +170,8 @@ impl<'a> Committer<'a> {
         Some(self.publish(made))
     }
 
-    /// Puts or ends a keep-out; always makes a revision. The lock of the keep-outs is held until that is published, for some
-    /// instructions, so that nobody who has it sees one without the other. No voxel changes, so no shard is locked.
+    /// Puts or ends a keep-out; always makes a revision. The lock of the keep-outs is held until that is published, for
+    /// some instructions, so that no reader sees one without the other. No voxel changes, so no shard is locked.
     fn change_keep_outs(self, KeepOutRecord { change, request }: &KeepOutRecord) -> Made {
         let before = self.unchanged();
         let committed = Committed { revision: before.revision + 1, ..before };
@@ -223,8 +223,8 @@ impl<'a> Committer<'a> {
         Committed::none(self.map.content_version())
     }
 
-    /// Finds out what it comes to that voxels go and others come, and builds what it needs, while readers go on; none once
-    /// stopped.
+    /// Finds out what it comes to that voxels go and others come, and builds what it needs, while readers go on; none
+    /// once stopped.
     fn plan(&self, removed: &VoxelSet, added: &VoxelSet, stop: StopSignal<'_>) -> Option<MapUpdate> {
         self.plan_in(removed, added, [], stop)
     }
@@ -313,7 +313,7 @@ pub struct ViewpointChange {
 }
 
 impl ViewpointChange {
-    /// Makes the change of revision `revision`. Those who hold the viewpoints as they are keep them.
+    /// Makes the change of revision `revision`. Holders of the viewpoints as they were keep them.
     fn apply(self, viewpoints: &mut Arc<ViewpointSet>, revision: u64) {
         if self.left.is_none() && self.gone.iter().all(|&gone| viewpoints.get(gone).is_none()) {
             return;
@@ -329,8 +329,8 @@ impl ViewpointChange {
 /// A change that was made, and what it did to the levels that are noted.
 type Made = (Committed, Vec<LevelChange>);
 
-/// What is to be done to a map. A shard is as it was planned for until the change is carried out, since the turn to change
-/// the map is held meanwhile.
+/// What is to be done to a map. A shard is as it was planned for until the change is carried out, since the turn to
+/// change the map is held meanwhile.
 struct MapUpdate {
     /// The finest voxels that go, and those that come.
     removed: Moved,

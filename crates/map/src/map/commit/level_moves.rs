@@ -72,7 +72,7 @@ impl LevelMoves {
         }
     }
 
-    /// The keys, copied for who watches the level.
+    /// The keys, copied for the watchers of the level.
     pub(super) fn to_keys_of_level(&self) -> KeysOfLevel {
         let (lost, gained) = self.keys();
         KeysOfLevel { level: self.level as u32, lost: lost.to_vec(), gained: gained.to_vec() }

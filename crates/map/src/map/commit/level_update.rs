@@ -7,7 +7,7 @@ use crate::map::shards::{CapacitySchedule, Shard, ShardLevel};
 use crate::util::StopSignal;
 
 /// Keys that a filter is built of between two looks at the stop signal: some milliseconds.
-const KEYS_PER_LOOK: usize = 64 << 10;
+const KEYS_PER_STOP_CHECK: usize = 64 << 10;
 
 /// Keys a level whose bits are cleared in place, while readers wait. Beyond that a copy of the plane is cleared
 /// beforehand, which takes longer in all and keeps nobody waiting.
@@ -53,15 +53,15 @@ enum FilterUpdate {
 }
 
 impl FilterUpdate {
-    /// Finds out what becomes of a filter of `shard` when the keys of `moves` go and come, and counts them. A larger filter
-    /// also forgets saturated counters.
+    /// Finds out what becomes of a filter of `shard` when the keys of `moves` go and come, and counts them. A larger
+    /// filter also forgets saturated counters.
     fn plan(shard: &Shard, filter: &CountingBloomFilter, moves: LevelMoves, stop: StopSignal<'_>) -> Self {
         let (level, (lost, gained)) = (moves.level(), moves.into_keys());
         let need = filter.len() + gained.len();
         if need > filter.capacity() {
             let capacity = CapacitySchedule::of(shard.number, level).for_items(need);
             let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
-            stop.pieces(&gained, KEYS_PER_LOOK).for_each(|keys| larger.insert_each(keys));
+            stop.pieces(&gained, KEYS_PER_STOP_CHECK).for_each(|keys| larger.insert_each(keys));
             shard.level(level as u32).for_some_keys(|keys| larger.insert_each(keys));
             lost.iter().for_each(|&key| larger.remove(key));
             return Self::Grown(larger);

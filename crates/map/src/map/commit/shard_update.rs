@@ -10,19 +10,19 @@ use crate::map::moments::MomentsLost;
 use crate::map::settings::MapSettings;
 use crate::map::shards::{Shard, levels_of};
 use crate::util::StopSignal;
-use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, ClusterUpdate, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCKS_PER_STOP_CHECK, BlockMask, ClusterUpdate, VoxelKey, VoxelSet};
 
-/// What is to be done to a shard so that voxels go and come at every level, found out and built while readers go on. Under
-/// the write lock pointers are exchanged, and filters' bits cleared and set; nothing is counted, and nothing is rebuilt. It
-/// holds for the shard as it was planned for.
+/// What is to be done to a shard so that voxels go and come at every level, found out and built while readers go on.
+/// Under the write lock pointers are exchanged, and filters' bits cleared and set; nothing is counted, and nothing is
+/// rebuilt. It holds for the shard as it was planned for.
 #[derive(Debug)]
 #[must_use = "what is planned is counted already"]
 pub(super) struct ShardUpdate {
     /// The finest voxels that go, and those that come.
     pub(super) removed: Moved,
     pub(super) added: Moved,
-    /// What becomes of the moments of voxels that lose descendants, before points are added to any; nothing where none are
-    /// wanted.
+    /// What becomes of the moments of voxels that lose descendants, before points are added to any; nothing where none
+    /// are wanted.
     pub(super) moments: MomentsLost,
     /// The keys that go and come of the levels that somebody watches.
     pub(super) noted: Vec<KeysOfLevel>,
@@ -71,9 +71,9 @@ impl Moved {
 }
 
 impl ShardUpdate {
-    /// Finds out what `changes` of blocks of finest voxels come to in `shard`, and counts them: voxels to remove that are not
-    /// there are passed over, and so the set says which keys the filters are told to forget (paper II-A). Once stopped, what
-    /// comes of it is not to be applied, and the shard of no use.
+    /// Finds out what `changes` of blocks of finest voxels come to in `shard`, and counts them: voxels to remove that
+    /// are not there are passed over, and so the set says which keys the filters are told to forget (paper II-A). Once
+    /// stopped, what comes of it is not to be applied, and the shard of no use.
     pub(super) fn plan(
         shard: &Shard,
         changes: &[BlockChange<'_>],
@@ -193,7 +193,7 @@ impl<'a> Tier<'a> {
             levels: levels.map(|level| LevelMoves::none(level, keeps_keys(level))).collect(),
             moments: MomentsLost::default(),
         };
-        for changes in stop.pieces(changes, BLOCKS_PER_LOOK) {
+        for changes in stop.pieces(changes, BLOCKS_PER_STOP_CHECK) {
             find_each(&shard.tiers[tier], changes, |change, before| of.block(change, before));
         }
         of

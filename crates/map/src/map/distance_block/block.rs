@@ -18,14 +18,14 @@ pub struct DistanceBlock {
     pub size: [usize; 3],
     /// The distance of cells that are so far from everything, or farther, quarter cells.
     pub cap: NonZeroU8,
-    /// A byte a cell, x fastest, then y: quarter cells from the cell's center to the nearest occupied cube, rounded down;
-    /// 0 for an occupied cell, and never more than `cap`.
+    /// A byte a cell, x fastest, then y: quarter cells from the cell's center to the nearest occupied cube, rounded
+    /// down; 0 for an occupied cell, and never more than `cap`.
     pub distances: Vec<u8>,
 }
 
 impl DistanceBlock {
-    /// The distances of `cells` from `voxels`, those of the level in `cells` and [`margin_of`] the cap around them (others
-    /// do no harm); none once stopped.
+    /// The distances of `cells` from `voxels`, those of the level in `cells` and [`margin_of`] the cap around them
+    /// (others do no harm); none once stopped.
     ///
     /// Takes [`DistanceBlock::bytes_max`] of memory.
     pub fn of(voxels: &VoxelSet, cells: &CellBox, cap: NonZeroU8, stop: StopSignal<'_>) -> Option<Self> {
@@ -75,7 +75,7 @@ fn quarters_up_to(cap: NonZeroU8) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::map::distance_block::cap::DISTANCE_CAP_MAX;
-    use crate::map::distance_block::transform::STEPS_PER_LOOK;
+    use crate::map::distance_block::transform::STEPS_PER_STOP_CHECK;
     use crate::voxel::{INDEX_MIN, Lattice, VoxelKey};
     use proptest::prelude::*;
     use std::cell::Cell;
@@ -188,7 +188,7 @@ mod tests {
             };
             let (made, all) = looks_of(usize::MAX);
             let wide: usize = cells.grown(64).size().iter().product();
-            assert!(made && wide / all <= STEPS_PER_LOOK, "{size:?}: {all} looks");
+            assert!(made && wide / all <= STEPS_PER_STOP_CHECK, "{size:?}: {all} looks");
             for looks_max in [0, 1, all / 2, all - 1] {
                 let (made, taken) = looks_of(looks_max);
                 assert!(

@@ -1,8 +1,8 @@
 //! How far the cells of a box are from what is occupied: an exact Euclidean distance transform.
 //!
-//! The distance is that from a cell's center to the nearest occupied *cube* of the level: along an axis on which the two are
-//! `d` cells apart it is `max(0, d - 1/2)` cells. Twice that is a whole number, and so is four times the square of a
-//! distance: all of this is done in integers, and comes out the same on every machine.
+//! The distance is that from a cell's center to the nearest occupied *cube* of the level: along an axis on which the
+//! two are `d` cells apart it is `max(0, d - 1/2)` cells. Twice that is a whole number, and so is four times the square
+//! of a distance: all of this is done in integers, and comes out the same on every machine.
 //!
 //! ```text
 //! layer      in each row along x, the square of the distance to the nearest occupied cell of the row

@@ -50,8 +50,8 @@ impl Rows {
         }
     }
 
-    /// Lowers a row to the least of what it has, and the rows `among` of `from` with the square of the way to each: the one
-    /// in the middle is where this row is. `place` says where a row lies in `from`.
+    /// Lowers a row to the least of what it has, and the rows `among` of `from` with the square of the way to each: the
+    /// one in the middle is where this row is. `place` says where a row lies in `from`.
     pub(super) fn lower(
         &mut self,
         row: usize,

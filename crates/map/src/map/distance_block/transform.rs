@@ -10,7 +10,7 @@ use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey, VoxelSet};
 
 /// Squares that are compared between two looks at the stop signal: some milliseconds.
-pub(super) const STEPS_PER_LOOK: usize = 4 << 20;
+pub(super) const STEPS_PER_STOP_CHECK: usize = 4 << 20;
 
 /// A transform of one box, of at least one cell.
 #[derive(Debug)]
@@ -72,7 +72,7 @@ impl<'a> Transform<'a> {
     /// The rows, with a look at the signal before the first and before every so many more, where others go first; they
     /// end once stopped. No lock is held meanwhile.
     fn in_parts<I: Iterator>(&self, rows: I) -> impl Iterator<Item = I::Item> {
-        let per_look = (STEPS_PER_LOOK / (self.size[0] * (2 * self.margin + 1))).max(1);
+        let per_look = (STEPS_PER_STOP_CHECK / (self.size[0] * (2 * self.margin + 1))).max(1);
         let stop = self.stop;
         let goes_on = move |at: usize| {
             if !at.is_multiple_of(per_look) {

@@ -1,7 +1,7 @@
 //! Keep-outs: named parts of space where no robot may go, whatever the map holds there.
 //!
-//! Each is a change of the map with a revision of its own. They are tested as shapes and are no voxels: alignment, exports
-//! and the content hash know nothing of them.
+//! Each is a change of the map with a revision of its own. They are tested as shapes and are no voxels: alignment,
+//! exports and the content hash know nothing of them.
 
 mod change;
 mod keep_outs;

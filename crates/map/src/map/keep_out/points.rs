@@ -7,7 +7,7 @@ use crate::util::StopSignal;
 /// Points of one word of the answer.
 const POINTS_PER_WORD: usize = 64;
 /// Words between two looks at the stop signal: some 10 ms where all points lie among all corners that there may be.
-const WORDS_PER_LOOK: usize = 4;
+const WORDS_PER_STOP_CHECK: usize = 4;
 
 impl KeepOuts {
     /// Sets the bit of each point that lies in a keep-out, and leaves the others: point i is bit i % 64 of
@@ -15,7 +15,7 @@ impl KeepOuts {
     pub fn mark(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64], stop: StopSignal<'_>) {
         let bounded: Vec<Bounded<'_>> = self.iter().map(Bounded::of).collect();
         let words = points.chunks(POINTS_PER_WORD).zip(occupied);
-        for (points, word) in stop.paced(words, WORDS_PER_LOOK) {
+        for (points, word) in stop.paced(words, WORDS_PER_STOP_CHECK) {
             let placed = |point: &Point| (map_from_points * point.to_f64()).into();
             let placed: Vec<[f64; 3]> = points.iter().map(placed).collect();
             // Points that come one after the other lie near each other: few keep-outs are looked at.

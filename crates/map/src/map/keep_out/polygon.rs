@@ -13,8 +13,8 @@ pub(super) fn is_flat(corners: &[Point2]) -> bool {
     sides(corners).next().is_none_or(|(a, b)| corners.iter().all(|&corner| turn(a, b, corner) == 0.0))
 }
 
-/// Two sides that share a point which they should not, by their first corners; none of a simple polygon. No corner may come
-/// twice.
+/// Two sides that share a point which they should not, by their first corners; none of a simple polygon. No corner may
+/// come twice.
 pub(super) fn crossing_sides(corners: &[Point2]) -> Option<(usize, usize)> {
     let all: Vec<_> = sides(corners).collect();
     let last = all.len() - 1;
@@ -34,7 +34,8 @@ pub(super) fn contains(corners: &[Point2], point: Point2) -> bool {
         if side == 0.0 && is_between(a, b, point) {
             return true;
         }
-        // A ray to the right crosses a side that goes up past the point's left hand, and one that goes down on its right.
+        // A ray to the right crosses a side that goes up past the point's left hand, and one that goes down on its
+        // right.
         let goes_up = a[1] <= point[1];
         if goes_up != (b[1] <= point[1]) && goes_up == (side > 0.0) {
             is_inside = !is_inside;
@@ -239,7 +240,8 @@ mod tests {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// True when two of the sides share a point, of so many that are looked at; whole numbers tell it exactly in halves.
+    /// True when two of the sides share a point, of so many that are looked at; whole numbers tell it exactly in
+    /// halves.
     fn crosses_itself(corners: &[Point2]) -> bool {
         let all: Vec<_> = sides(corners).collect();
         pairs(all.len()).any(|(i, j)| {

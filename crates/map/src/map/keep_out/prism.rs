@@ -43,8 +43,8 @@ pub enum PrismError {
 }
 
 impl Prism {
-    /// The prism of the polygon with `corners_m` (x and y of each, in either direction round it) from the height `z_m[0]`
-    /// to `z_m[1]`.
+    /// The prism of the polygon with `corners_m` (x and y of each, in either direction round it) from the height
+    /// `z_m[0]` to `z_m[1]`.
     ///
     /// # Errors
     /// When there are fewer than 3 corners or more than [`PRISM_CORNERS_MAX`], a number is not finite or beyond

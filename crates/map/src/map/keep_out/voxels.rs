@@ -6,13 +6,13 @@ use crate::map::regions::{Region, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey, VoxelSet};
 
-/// Places that are looked at for each voxel that may be found, at most: shapes are mostly inside, and of a sheet that is as
-/// thin as a voxel, its neighbors are looked at too.
+/// Places that are looked at for each voxel that may be found, at most: shapes are mostly inside, and of a sheet that
+/// is as thin as a voxel, its neighbors are looked at too.
 const PLACES_PER_VOXEL: usize = 4;
 /// Places that may be looked at besides.
 const PLACES_MIN: usize = 64 << 10;
 /// Places between two looks at the stop signal: a millisecond or less of a prism with many corners.
-const PLACES_PER_LOOK: usize = 1024;
+const PLACES_PER_STOP_CHECK: usize = 1024;
 
 /// Keep-outs take more voxels than may be found, or finding them takes as long as if they did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -107,7 +107,7 @@ impl Search<'_> {
     /// Looks at the cube of 2^`halvings` voxels a side that begins with the voxel `first`.
     fn look_at(&mut self, target: &Target<'_>, first: [i32; 3], halvings: u32) -> Result<(), TooManyVoxels> {
         self.places = self.places.checked_sub(1).ok_or(TooManyVoxels)?;
-        if self.places.is_multiple_of(PLACES_PER_LOOK) && self.stop.is_stopped() {
+        if self.places.is_multiple_of(PLACES_PER_STOP_CHECK) && self.stop.is_stopped() {
             // The next look ends the search: what it finds means nothing any more.
             self.places = 0;
         }
@@ -149,8 +149,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// False of a cube in which no center lies in the shape and the region: both are further from its center than its corners
-    /// are.
+    /// False of a cube in which no center lies in the shape and the region: both are further from its center than its
+    /// corners are.
     fn may_hold(&self, target: &Target<'_>, first: [i32; 3], halvings: u32) -> bool {
         let voxel_m = self.lattice.resolution_m(self.level);
         let side = f64::from(1u32 << halvings);

@@ -18,8 +18,8 @@ impl MapView<'_> {
         CellBounds { first: [INDEX_MIN >> finer; 3], end: [(INDEX_MAX >> finer) + 1; 3] }
     }
 
-    /// A box around all voxels that the view covers, in cells of the tier that serves `level`: as small as whole blocks of
-    /// the coarsest tier allow. None without a voxel.
+    /// A box around all voxels that the view covers, in cells of the tier that serves `level`: as small as whole blocks
+    /// of the coarsest tier allow. None without a voxel.
     pub(crate) fn cell_bounds(&self, level: u32) -> Option<CellBounds> {
         let coarsest = self.lattice().levels() - 1;
         let tiers_up = tier_of(coarsest).0 - tier_of(level).0;

@@ -7,16 +7,16 @@ use crate::map::view::MapView;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, CLUSTER_LEVELS, Cell, Cluster, VoxelKey};
 
 impl MultiResolutionMap {
-    /// The coarsest level whose blocks [`MapView::level_block`] gives: up to three more than the map has, since blocks hold
-    /// three levels, and which of them are there is one more.
+    /// The coarsest level whose blocks [`MapView::level_block`] gives: up to three more than the map has, since blocks
+    /// hold three levels, and which of them are there is one more.
     pub fn block_levels_end(&self) -> u32 {
         (tier_of(self.settings.levels - 1).0 as u32 + 1) * BLOCK_LEVELS
     }
 }
 
 impl MapView<'_> {
-    /// The voxels of `level` in `block`, a key three levels coarser: all of them where the view covers the whole map. Levels
-    /// go up to [`MultiResolutionMap::block_levels_end`].
+    /// The voxels of `level` in `block`, a key three levels coarser: all of them where the view covers the whole map.
+    /// Levels go up to [`MultiResolutionMap::block_levels_end`].
     pub fn level_block(&self, level: u32, block: VoxelKey) -> BlockMask {
         let (tier, up) = tier_of(level);
         if level == self.map().block_levels_end() {

@@ -4,7 +4,7 @@ use crate::map::regions::{Region, VoxelSelection};
 use crate::map::shards::tier_of;
 use crate::map::view::MapView;
 use crate::util::StopSignal;
-use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, Lattice, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_STOP_CHECK, BlockMask, Cell, Lattice, VoxelKey, VoxelSet};
 
 /// Voxels of a level as they were copied out of a map, with parts of one block apart: to be joined once the map is no
 /// longer locked.
@@ -26,7 +26,9 @@ impl MapView<'_> {
         let (_, up) = tier_of(level);
         let mut parts = Vec::with_capacity(self.lists(level).map(|list| list.blocks().len()).sum());
         let stored = self.lists(level).flat_map(|list| list.blocks().iter());
-        parts.extend(stop.paced(stored, BLOCKS_PER_LOOK).map(|(block, mask)| coarsened(block, mask, up)));
+        parts.extend(
+            stop.paced(stored, BLOCKS_PER_STOP_CHECK).map(|(block, mask)| coarsened(block, mask, up)),
+        );
         BlockParts(parts)
     }
 

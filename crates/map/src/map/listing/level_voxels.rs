@@ -4,7 +4,7 @@ use crate::map::regions::VoxelSelection;
 use crate::map::shards::tier_of;
 use crate::map::view::MapView;
 use crate::util::StopSignal;
-use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey};
+use crate::voxel::{BLOCKS_PER_STOP_CHECK, BlockMask, VoxelKey};
 
 /// A block with at least so many voxels is copied as it is stored, one with fewer voxel by voxel: whichever is smaller.
 const VOXELS_OF_BLOCK_MIN: usize = size_of::<(VoxelKey, BlockMask)>() / size_of::<VoxelKey>();
@@ -39,7 +39,7 @@ impl LevelVoxels {
         const SOME: usize = 4096;
         self.voxels.chunks(SOME).for_each(&mut f);
         let mut some = Vec::with_capacity(2 * SOME);
-        for (block, mask) in stop.paced(self.blocks.iter(), BLOCKS_PER_LOOK) {
+        for (block, mask) in stop.paced(self.blocks.iter(), BLOCKS_PER_STOP_CHECK) {
             some.extend(mask.cells(self.up).map(|cell| cell.voxel(*block).ancestor(self.up)));
             if some.len() >= SOME {
                 f(&some);
@@ -61,8 +61,8 @@ impl LevelVoxels {
 }
 
 impl MapView<'_> {
-    /// Copies the selected voxels of `level`. Looks at `stop` and at `most` shard by shard: where it ends early for one of
-    /// them the copy is not whole, and longer than `most` for the latter.
+    /// Copies the selected voxels of `level`. Looks at `stop` and at `most` shard by shard: where it ends early for one
+    /// of them the copy is not whole, and longer than `most` for the latter.
     pub fn level_voxels(
         &self,
         level: u32,

@@ -4,7 +4,7 @@ use crate::map::regions::{Region, VoxelSelection};
 use crate::map::shards::{OccupiedVoxelList, tier_of};
 use crate::map::view::MapView;
 use crate::util::StopSignal;
-use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_SIDE, BLOCKS_PER_STOP_CHECK, BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
 impl MapView<'_> {
     /// The finest voxels at and below the voxels of `level` whose centers lie in `region`.
@@ -67,8 +67,8 @@ impl MapView<'_> {
 
     /// Calls `f` with each block of a list that can hold a selected voxel.
     ///
-    /// Walks the blocks that the selection's bounds meet, or all that are stored where those are fewer; some of them once
-    /// stopped.
+    /// Walks the blocks that the selection's bounds meet, or all that are stored where those are fewer; some of them
+    /// once stopped.
     pub(crate) fn for_each_block(
         &self,
         list: &OccupiedVoxelList<'_>,
@@ -85,10 +85,11 @@ impl MapView<'_> {
         };
         let candidates = block_bounds(selection, block_m);
         if volume(&candidates) < blocks.len() as f64 {
-            let candidates = stop.paced(grid(candidates), BLOCKS_PER_LOOK).filter(may_meet);
+            let candidates = stop.paced(grid(candidates), BLOCKS_PER_STOP_CHECK).filter(may_meet);
             candidates.for_each(|block| f(block, blocks.get(block)));
         } else {
-            let stored = stop.paced(blocks.iter(), BLOCKS_PER_LOOK).filter(|(block, _)| may_meet(block));
+            let stored =
+                stop.paced(blocks.iter(), BLOCKS_PER_STOP_CHECK).filter(|(block, _)| may_meet(block));
             stored.for_each(|(block, mask)| f(block, mask));
         }
     }

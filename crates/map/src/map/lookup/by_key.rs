@@ -1,4 +1,5 @@
-//! The look-up in the filter alone, of voxels whose keys are known: what experiment 1 of the paper times by itself (IV-A).
+//! The look-up in the filter alone, of voxels whose keys are known: what experiment 1 of the paper times by itself
+//! (IV-A).
 
 use super::level_view::LevelView;
 use super::scalar;

@@ -11,8 +11,8 @@ pub enum Lookup {
     /// The exact set.
     #[default]
     Exact,
-    /// The counting Bloom filter alone: now and then "occupied" of a free voxel, never "free" of an occupied one. The exact
-    /// set in a map without filters.
+    /// The counting Bloom filter alone: now and then "occupied" of a free voxel, never "free" of an occupied one. The
+    /// exact set in a map without filters.
     Bloom,
 }
 
@@ -44,7 +44,8 @@ pub struct LevelView<'a> {
 }
 
 impl<'a> LevelView<'a> {
-    /// A view of the lists that `list` gives, whose filters have so many `hashes`; a shard without one is read as empty.
+    /// A view of the lists that `list` gives, whose filters have so many `hashes`; a shard without one is read as
+    /// empty.
     pub(in crate::map) fn new(
         level: u32,
         up: u32,

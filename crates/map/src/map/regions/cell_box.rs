@@ -11,8 +11,8 @@ pub struct CellBox {
 }
 
 impl CellBox {
-    /// The cells of `level` whose centers lie from `min_m` to `max_m` (map frame, meters), borders included. Infinite sides
-    /// end where the level's indices do.
+    /// The cells of `level` whose centers lie from `min_m` to `max_m` (map frame, meters), borders included. Infinite
+    /// sides end where the level's indices do.
     pub fn of_centers(min_m: [f64; 3], max_m: [f64; 3], lattice: &Lattice, level: u32) -> Self {
         let (first, end) = (INDEX_MIN >> level, (INDEX_MAX >> level) + 1);
         let center = |i| lattice.center_along_m(i, level);

@@ -1,7 +1,7 @@
 //! Errors of regions, and how far they may reach.
 
-/// How far from the origin a sphere or an oriented box may lie and reach, meters: ten thousand times as far as the largest
-/// map goes.
+/// How far from the origin a sphere or an oriented box may lie and reach, meters: ten thousand times as far as the
+/// largest map goes.
 pub const REGION_M_MAX: f64 = 1e12;
 
 /// Why numbers are not a region.

@@ -41,8 +41,8 @@ impl Frustum {
     /// radians), of what lies from `near_m` to `far_m` in front of it (along its z axis, meters).
     ///
     /// # Errors
-    /// When an angle does not lie between 0 and pi, `near_m` is negative, `far_m` is not beyond it, or a number is not finite
-    /// or beyond [`REGION_M_MAX`].
+    /// When an angle does not lie between 0 and pi, `near_m` is negative, `far_m` is not beyond it, or a number is not
+    /// finite or beyond [`REGION_M_MAX`].
     pub fn new(
         map_from_camera: Pose,
         angles_rad: [f64; 2],

@@ -38,12 +38,14 @@ impl VoxelSelection {
         (!self.is_everything()).then(|| CellBox::of_centers(min_m, max_m, lattice, level))
     }
 
-    /// False only when no voxel within `radius_m` of `center_m` is among them. What the bounds say is not looked at again.
+    /// False only when no voxel within `radius_m` of `center_m` is among them. What the bounds say is not looked at
+    /// again.
     pub(in crate::map) fn may_meet(&self, center_m: [f64; 3], radius_m: f64) -> bool {
         self.view.is_none_or(|view| view.may_meet(center_m, radius_m))
     }
 
-    /// A box around them: (smallest, largest) coordinates, map frame, meters; of none where they are in the wrong order.
+    /// A box around them: (smallest, largest) coordinates, map frame, meters; of none where they are in the wrong
+    /// order.
     pub(in crate::map) fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         let everywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
         let region = self.region.as_ref().map(Region::bounds_m);

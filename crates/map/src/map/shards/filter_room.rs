@@ -9,8 +9,8 @@ use crate::voxel::{BLOCK_LEVELS, VoxelSet};
 const BITS_A_BIT: f64 = 5.0;
 
 impl MapSettings {
-    /// Bytes of memory of the room that the filters of a map make for their first keys, at most; one without a voxel takes
-    /// a word for each.
+    /// Bytes of memory of the room that the filters of a map make for their first keys, at most; one without a voxel
+    /// takes a word for each.
     pub fn first_filter_bytes(&self) -> u64 {
         let keys = capacity_schedule::FIRST * capacity_schedule::FACTOR;
         (SHARDS as f64 * f64::from(self.levels) * keys * self.filter_bytes_a_key()) as u64

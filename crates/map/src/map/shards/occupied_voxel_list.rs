@@ -7,8 +7,8 @@ use super::shard_level::ShardLevel;
 use crate::bloom::CountingBloomFilter;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey};
 
-/// The occupied voxels of one level, of one shard: an exact set and, in maps that have filters, the counting Bloom filter
-/// in front of it, which always hold the same keys.
+/// The occupied voxels of one level, of one shard: an exact set and, in maps that have filters, the counting Bloom
+/// filter in front of it, which always hold the same keys.
 ///
 /// The exact set is a table of 8^3 blocks that serves three levels at once, so this is a view: which table, and
 /// how many levels up in its blocks.
@@ -44,7 +44,8 @@ impl<'a> OccupiedVoxelList<'a> {
         self.filter().is_none_or(|filter| filter.contains(voxel.to_bits())) && self.set_contains(voxel)
     }
 
-    /// False only when `voxel` of this level is certainly not occupied: the filter alone, or the set where there is none.
+    /// False only when `voxel` of this level is certainly not occupied: the filter alone, or the set where there is
+    /// none.
     pub fn may_contain(&self, voxel: VoxelKey) -> bool {
         match self.filter() {
             Some(filter) => filter.contains(voxel.to_bits()),

@@ -13,8 +13,8 @@ pub(in crate::map) struct ShardLevel {
 }
 
 impl ShardLevel {
-    /// A level without a voxel. Its filter has no room yet: the first key makes it, so that the many shards of a small map
-    /// that hold nothing take nothing.
+    /// A level without a voxel. Its filter has no room yet: the first key makes it, so that the many shards of a small
+    /// map that hold nothing take nothing.
     pub(super) fn empty(settings: &MapSettings) -> Self {
         Self { voxels: 0, filter: settings.filter.map(CountingBloomFilter::without_room) }
     }

@@ -67,7 +67,8 @@ impl Sharding {
         shard_of_region(index.map(|i| i >> self.shift_at(level)))
     }
 
-    /// The shard of the voxel at `index` of `level`; none where the level is so coarse that the voxel spans several regions.
+    /// The shard of the voxel at `index` of `level`; none where the level is so coarse that the voxel spans several
+    /// regions.
     pub(in crate::map) fn shard_of_node(self, index: [i32; 3], level: u32) -> Option<usize> {
         (level <= self.region_shift).then(|| self.shard_of(index, level))
     }

@@ -22,8 +22,8 @@ pub(crate) struct TierView<'a> {
 }
 
 impl<'a> TierView<'a> {
-    /// A view of the lists of `level` that `list` gives; a shard without one is read as empty. `region_shift` is that of
-    /// the tier's cells, whose side is `cell_m`.
+    /// A view of the lists of `level` that `list` gives; a shard without one is read as empty. `region_shift` is that
+    /// of the tier's cells, whose side is `cell_m`.
     pub(in crate::map) fn new(
         level: u32,
         region_shift: u32,
@@ -65,7 +65,8 @@ impl<'a> TierView<'a> {
         self.in_shard(shard, VoxelKey::pack(cell.map(|i| i >> CELL_TO_CLUSTER)))
     }
 
-    /// Index of the cluster that the place `at`, in cells, lies in; of the nearest one where it lies beyond where indices end.
+    /// Index of the cluster that the place `at`, in cells, lies in; of the nearest one where it lies beyond where
+    /// indices end.
     #[inline(always)]
     pub(crate) fn cluster_index(&self, at: [f64; 3]) -> [i32; 3] {
         let clusters = at.map(|c| (c / f64::from(CLUSTER_SIDE)).floor());

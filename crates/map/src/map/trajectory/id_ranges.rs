@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-/// Ranges of ids that a map remembers of one session's forgotten scans, at most: 64 KiB. Beyond, the two of the smallest
-/// ids become one, with the gap between them: an id from there counts as accepted, whether it was or not.
+/// Ranges of ids that a map remembers of one session's forgotten scans, at most: 64 KiB. Beyond, the two of the
+/// smallest ids become one, with the gap between them: an id from there counts as accepted, whether it was or not.
 pub const ID_RANGES_PER_SESSION_MAX: usize = 4096;
 
 /// Sorted ranges of ids, both ends within, with a gap between any two.

@@ -16,8 +16,8 @@ impl Keyed for MappedScan {
     }
 }
 
-/// Robots whose scans were all undone and whose scan ids are remembered all the same, at most: so that one who undoes what
-/// it sent under ever new names neither fills the memory nor takes these names from others.
+/// Robots whose scans were all undone and whose scan ids are remembered all the same, at most: so that one who undoes
+/// what it sent under ever new names neither fills the memory nor takes these names from others.
 pub(super) const NAMES_WITHOUT_SCANS_MAX: usize = 1024;
 
 /// The accepted scans of all robots, in the order of their revisions. A clone takes no time.

@@ -11,8 +11,9 @@
 //! what it changes: a chunk, where somebody holds a clone, and nothing where nobody does. Undo marks poses; they go
 //! when their chunks are thinned (see [`TrajectorySpacing`] and [`Trajectory::thin`]).
 //!
-//! A pose with its indices takes 256 bytes, as `tests/map/trajectory_growth.rs` measures. A week of eight robots at 10 Hz is 48
-//! million scans: thinned, 80,640 poses of one a minute, or 18 MB, and one a place and direction of each robot.
+//! A pose with its indices takes 256 bytes, as `tests/map/trajectory_growth.rs` measures. A week of eight robots at 10
+//! Hz is 48 million scans: thinned, 80,640 poses of one a minute, or 18 MB, and one a place and direction of each
+//! robot.
 
 mod chunked;
 mod id_ranges;

@@ -13,7 +13,8 @@ pub struct ScanRecord {
     pub pose: MappedScan,
     /// Every distinct finest voxel that the scan touches, known before or not.
     pub voxels: VoxelSet,
-    /// Finest voxels that were there and go, since the scan saw through them: none of `voxels`. They go before its own come.
+    /// Finest voxels that were there and go, since the scan saw through them: none of `voxels`. They go before its own
+    /// come.
     pub carved: VoxelSet,
     /// What its points add to the moments of their voxels; nothing in a map that keeps none.
     pub moments: MomentSet,
@@ -26,8 +27,8 @@ pub struct ScanRecord {
 pub struct ViewpointRecord {
     /// How far it saw in each direction.
     pub image: RangeImage,
-    /// The revisions of the scans whose viewpoints go, since there is no more room for them; ascending. They stay gone when the
-    /// scan is undone: what they saw is unknown then, never free.
+    /// The revisions of the scans whose viewpoints go, since there is no more room for them; ascending. They stay gone
+    /// when the scan is undone: what they saw is unknown then, never free.
     pub displaced: Vec<u64>,
 }
 

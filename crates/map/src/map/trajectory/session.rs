@@ -6,8 +6,8 @@ use super::id_ranges::IdRanges;
 /// The ids of one session's scans.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Session {
-    /// Ids of accepted scans whose poses are stored, with the revisions that they made. Scans that were undone are among
-    /// them.
+    /// Ids of accepted scans whose poses are stored, with the revisions that they made. Scans that were undone are
+    /// among them.
     ids: Chunked<(u64, u64)>,
     /// Ids of accepted scans whose poses are not stored any more.
     forgotten: IdRanges,

@@ -1,16 +1,16 @@
 //! Which old poses are kept.
 //!
-//! Poses that no undo reaches any more are thinned: of those of one robot, each is kept that was taken where, and looking
-//! where, none that is kept was taken, or long after the last one that is kept. The rest go. So a robot that drives
-//! through the same hall for years leaves one pose a place and direction, and one a minute.
+//! Poses that no undo reaches any more are thinned: of those of one robot, each is kept that was taken where, and
+//! looking where, none that is kept was taken, or long after the last one that is kept. The rest go. So a robot that
+//! drives through the same hall for years leaves one pose a place and direction, and one a minute.
 //!
 //! The last two of a robot before what undo reaches stay whatever they show, so that the undo of all that came later
 //! leaves its last pose and its velocity. They are judged when they are the last two no more.
 //!
 //! Each pose is judged once, in the order of revisions, by those before it alone. So it does not matter when and how
 //! often thinning is done: up to the same revision it comes to the same poses. A server that starts again from an old
-//! snapshot thins what the one before it had thinned; thinning is no change of the map, has no revision and no record in
-//! the journal.
+//! snapshot thins what the one before it had thinned; thinning is no change of the map, has no revision and no record
+//! in the journal.
 
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::sync::Arc;

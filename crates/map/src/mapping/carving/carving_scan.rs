@@ -10,11 +10,12 @@ use crate::visibility::{ScanRays, ScanSurface, SurfaceSettings};
 use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
 
 /// Blocks of voxels that are looked at between two looks at the stop signal.
-const BLOCKS_PER_LOOK: usize = 16;
+const BLOCKS_PER_STOP_CHECK: usize = 16;
 /// Samples of a surface are so much closer to each other than its margins are wide, since they lie askew to the voxels.
 const SAMPLE_SHARE: f64 = 0.7;
 
-/// How far from each other the points of a scan may lie, in voxels, where it carves: what is thicker than that was met by one.
+/// How far from each other the points of a scan may lie, in voxels, where it carves: what is thicker than that was met
+/// by one.
 const GAP_MAX_VOXELS: f64 = 1.5;
 
 /// What a scan saw through.
@@ -87,14 +88,14 @@ impl CarvingScan<'_> {
             mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| sight.sees_through(*voxel))
         };
         let missed: VoxelSet =
-            stop.paced(candidates.blocks(), BLOCKS_PER_LOOK).flat_map(seen_through).collect();
+            stop.paced(candidates.blocks(), BLOCKS_PER_STOP_CHECK).flat_map(seen_through).collect();
         let map_from_sensor = &self.record.pose.map_from_sensor;
         let thin = ThinThings::among(&candidates, &surface, map.lattice(), map_from_sensor, sight.radius_m);
         let gone = |&(block, ref mask): &(VoxelKey, BlockMask)| {
             let thin = &thin;
             mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| !thin.may_be_at(*voxel))
         };
-        let wide: Vec<VoxelKey> = stop.paced(missed.blocks(), BLOCKS_PER_LOOK).flat_map(gone).collect();
+        let wide: Vec<VoxelKey> = stop.paced(missed.blocks(), BLOCKS_PER_STOP_CHECK).flat_map(gone).collect();
         let voxels = with_what_hangs_on(wide, &missed);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
@@ -156,7 +157,7 @@ impl Sight<'_> {
             return false;
         }
         let offset = offset.coords.map(|c| c as f32).into();
-        self.surface.sees_beyond(offset, self.radius_m)
+        self.surface.depth_exceeds(offset, self.radius_m)
             && !self.is_near_solid(voxel)
             && self.surface.sees_through(offset, self.radius_m, self.gap_max_m)
     }

@@ -19,8 +19,8 @@ pub struct CarvingSettings {
     pub margin_voxels: u32,
     /// A surface that is seen at a smaller angle than this is not told from a rim, degrees. 8.
     pub grazing_deg: f64,
-    /// Voxels farther from the sensor than this are not carved, meters: a pose that is a tenth of a degree off moves what is 20 m
-    /// away by 3.5 cm. 20.
+    /// Voxels farther from the sensor than this are not carved, meters: a pose that is a tenth of a degree off moves
+    /// what is 20 m away by 3.5 cm. 20.
     pub range_max_m: f64,
 }
 

@@ -7,11 +7,11 @@ use crate::geometry::{Point, Pose};
 use crate::visibility::{RayWindow, ScanSurface};
 use crate::voxel::{Lattice, LatticeFromPoints, VoxelKey, VoxelSet};
 
-/// Things whose voxels lie side by side in so many or more, across the view, are at least as thick as what the rays of a scan that carves
-/// cannot miss.
+/// Things whose voxels lie side by side in so many or more, across the view, are at least as thick as what the rays of
+/// a scan that carves cannot miss.
 const WIDE: usize = 4;
-/// How far rays may lie from each other across things of one to three voxels, in voxels. What fills one or two may be as thin as it likes:
-/// what is thicker than this was met.
+/// How far rays may lie from each other across things of one to three voxels, in voxels. What fills one or two may be
+/// as thin as it likes: what is thicker than this was met.
 const GAPS_MAX: [f64; WIDE - 1] = [0.2, 0.2, 0.6];
 /// How much deeper what lies beside a voxel may be, in voxels: nearest first.
 const ASKEW: [i32; 7] = [0, -1, 1, -2, 2, -3, 3];
@@ -20,8 +20,9 @@ const LENGTH: usize = 3;
 
 /// Voxels that a scan saw through, some of which may hold things thinner than they are.
 ///
-/// A pole or the edge of a table fills a small part of its voxels. Rays that pass these on both sides say nothing of it where they lie
-/// farther apart than it is thick. So what is narrow, as it is seen from the sensor, is gone only where rays would have met it.
+/// A pole or the edge of a table fills a small part of its voxels. Rays that pass these on both sides say nothing of it
+/// where they lie farther apart than it is thick. So what is narrow, as it is seen from the sensor, is gone only where
+/// rays would have met it.
 pub(super) struct ThinThings<'a> {
     /// Voxels that hold something as the map has it, and none of the surface that the scan shows.
     not_met: &'a VoxelSet,
@@ -70,8 +71,8 @@ impl<'a> ThinThings<'a> {
         })
     }
 
-    /// How many voxels that were not met lie side by side along an axis across the view, this one with them; no more than [`WIDE`] are told.
-    /// A surface that is seen askew lies deeper from one to the next.
+    /// How many voxels that were not met lie side by side along an axis across the view, this one with them; no more
+    /// than [`WIDE`] are told. A surface that is seen askew lies deeper from one to the next.
     fn width(&self, center: &Point3<f64>, axis: &Vector3<f64>, ray: &Vector3<f64>) -> usize {
         let resolution_m = self.lattice.resolution_m(0);
         let deeper_by = |steps: f64, deep: i32| {
@@ -93,7 +94,8 @@ impl<'a> ThinThings<'a> {
     }
 }
 
-/// These voxels, and those of `missed` that hang together with them: a side of a thing that is gone may have been seen edge-on.
+/// These voxels, and those of `missed` that hang together with them: a side of a thing that is gone may have been seen
+/// edge-on.
 pub(super) fn with_what_hangs_on(gone: Vec<VoxelKey>, missed: &VoxelSet) -> VoxelSet {
     let (mut found, mut next): (HashSet<VoxelKey>, _) = (gone.iter().copied().collect(), gone);
     let steps = || -1..=1;

@@ -6,18 +6,18 @@ use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRec
 use crate::util::StopSignal;
 use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 
-/// How far a robot moves between two scans, and turns: one standard deviation. What was found is only a guess, which the map has to
-/// confirm.
+/// How far a robot moves between two scans, and turns: one standard deviation. What was found is only a guess, which
+/// the map has to confirm.
 const MOVED_M: f64 = 0.5;
 const MOVED_DEG: f64 = 9.0;
 /// What is further away is seen up to here, meters.
 const RANGE_MAX_M: f32 = 60.0;
 
-/// Where the sensor was at the scan `now` in the frame of the sensor at the scan `before`: before_from_now. None where the
-/// one does not align to the other.
+/// Where the sensor was at the scan `now` in the frame of the sensor at the scan `before`: before_from_now. None where
+/// the one does not align to the other.
 ///
-/// Both are points in the sensor frame, meters. The scan `before` is a map of its own, with the levels of `settings`; the
-/// sensor is thought to have stood still.
+/// Both are points in the sensor frame, meters. The scan `before` is a map of its own, with the levels of `settings`;
+/// the sensor is thought to have stood still.
 pub(super) fn motion_between(
     before: &[Point],
     now: &[Point],

@@ -31,8 +31,8 @@ impl<'a> ScanMapper<'a> {
 
     /// Looks for a scan that was refused where it was `located`: aligns it from other guesses. Returns where it is.
     ///
-    /// An accepted scan is returned as it is, and so is one that is in the map at the caller's word (`at_guess`, `force`):
-    /// its robot is lost no longer.
+    /// An accepted scan is returned as it is, and so is one that is in the map at the caller's word (`at_guess`,
+    /// `force`): its robot is lost no longer.
     ///
     /// # Errors
     /// `stop` said so.
@@ -240,7 +240,8 @@ impl<'a> ScanMapper<'a> {
         meters <= settings.agreement * self.map.settings().resolution_m && degrees <= settings.agreement_deg
     }
 
-    /// True of a pose that the robot can have reached, and that the covariance of the scan's own guess does not rule out.
+    /// True of a pose that the robot can have reached, and that the covariance of the scan's own guess does not rule
+    /// out.
     fn may_be_at(&self, scan: &Scan<'_>, pose: &Pose) -> bool {
         let is_in_reach = self
             .reachable(scan.robot, scan.timestamp_ns)

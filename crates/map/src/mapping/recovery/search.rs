@@ -22,8 +22,9 @@ use crate::util::StopSignal;
 const CANDIDATES: usize = 2;
 
 impl ScanMapper<'_> {
-    /// What to search for after a scan of `robot` was refused. None where the robot is not lost, a place that a search found is to be confirmed first, or a search is
-    /// under way or was not long ago. Whoever takes it has to [search](Self::search).
+    /// What to search for after a scan of `robot` was refused. None where the robot is not lost, a place that a search
+    /// found is to be confirmed first, or a search is under way or was not long ago. Whoever takes it has to
+    /// [search](Self::search).
     pub fn begin_search(&self, robot: &RobotName) -> Option<SearchTask> {
         let recovery = self.recovery?;
         let query = |number, timestamp_ns, gravity: Option<Gravity>| {
@@ -33,7 +34,8 @@ impl ScanMapper<'_> {
         recovery.lost.begin_search(robot, recovery.settings.search_interval, query)
     }
 
-    /// Searches for a lost robot with no guess. What is found is not believed yet: the robot's next scan has to confirm it.
+    /// Searches for a lost robot with no guess. What is found is not believed yet: the robot's next scan has to confirm
+    /// it.
     ///
     /// # Errors
     /// As for [`localize`](crate::align::localize::localize).
@@ -56,8 +58,9 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// Searches for the robot of a refused scan at once, and for as long as it takes; returns the scan as it was located, with that time. The
-    /// next scan has to confirm what is found: in a mirror, along shelves and before a blank wall the same scan fits at a wrong place as well.
+    /// Searches for the robot of a refused scan at once, and for as long as it takes; returns the scan as it was
+    /// located, with that time. The next scan has to confirm what is found: in a mirror, along shelves and before a
+    /// blank wall the same scan fits at a wrong place as well.
     pub(in crate::mapping) fn search_at_once(
         &self,
         scan: &Scan<'_>,

@@ -1,4 +1,4 @@
-//! Where bodies are: for who knows a part of a map, and asks whether that is enough.
+//! Where bodies are: for a copy of a part of a map, to know whether that part is enough.
 
 use super::body_of_links::Body;
 use super::configurations::Configurations;

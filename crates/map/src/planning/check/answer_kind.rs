@@ -42,7 +42,7 @@ impl Clearances {
     pub(super) fn up_to(most_m: f32, cells_per_m: f64) -> Result<Self, PlanningError> {
         let (value, max) = (f64::from(most_m), CLEARANCE_CELLS_MAX / cells_per_m);
         let most = (value * cells_per_m).min(CLEARANCE_CELLS_MAX);
-        // Who asks for the largest distance says the float next to it, which may be more.
+        // The largest distance comes as the float next to it, which may be more.
         let is_in_range = (0.0..=max as f32).contains(&most_m);
         let refused = PlanningError::Number { field: "clearance_max_m", value, min: 0.0, max };
         is_in_range.then_some(Self { most_m, most, cells_per_m }).ok_or(refused)

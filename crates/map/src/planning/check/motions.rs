@@ -182,7 +182,7 @@ impl MotionQuestion<'_> {
     fn step_m(&self, cells_per_m: f64) -> Result<f64, PlanningError> {
         let value = self.step_m.map_or(0.5 / cells_per_m, f64::from);
         let max = f64::from(RADIUS_MAX_M);
-        // Who asks for the least step says the float next to it, which may be less.
+        // The least step comes as the float next to it, which may be less.
         let is_valid = (STEP_MIN_M as f32..=max as f32).contains(&(value as f32));
         is_valid.then_some(value).ok_or(PlanningError::Number {
             field: "step_m",

@@ -20,8 +20,8 @@ pub struct GridExtent {
     pub size: [usize; 2],
 }
 
-/// Which cells the grid has that [`project_grid`](super::project_grid) would draw: as long as the area is given, without
-/// looking at a voxel.
+/// Which cells the grid has that [`project_grid`](super::project_grid) would draw: as long as the area is given,
+/// without looking at a voxel.
 ///
 /// # Errors
 /// When a number is out of range, or there are more cells than may be.

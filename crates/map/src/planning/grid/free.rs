@@ -121,7 +121,7 @@ impl Projection {
     fn may_be_seen(&self, view: &MapView<'_>, block: VoxelKey) -> bool {
         let side_m = self.voxel_m * f64::from(BLOCK_SIDE);
         let low_m = block.index().map(|i| f64::from(i) * side_m);
-        view.viewpoints().is_some_and(|viewpoints| viewpoints.may_look_into(low_m, low_m.map(|c| c + side_m)))
+        view.viewpoints().is_some_and(|viewpoints| viewpoints.may_cover(low_m, low_m.map(|c| c + side_m)))
     }
 
     /// The blocks of the area and the band, as far as any viewpoint looked: their indices along each axis.

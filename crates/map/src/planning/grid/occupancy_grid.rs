@@ -13,8 +13,8 @@ pub struct Grid {
     pub size: [usize; 2],
     /// Whether cell i has a voxel or a keep-out: bit i % 64 of `occupied[i / 64]`.
     pub occupied: Vec<u64>,
-    /// Height of the top of the highest voxel of each cell that reaches into the band, meters, which may lie above it by
-    /// less than a voxel; NaN for a cell without one.
+    /// Height of the top of the highest voxel of each cell that reaches into the band, meters, which may lie above it
+    /// by less than a voxel; NaN for a cell without one.
     pub tops_m: Vec<f32>,
     /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was
     /// not, the grid does not tell what was seen.
@@ -30,8 +30,8 @@ impl Grid {
         Self { cell_m, origin_m, size, occupied: none(), tops_m: vec![f32::NAN; cells], free }
     }
 
-    /// Puts a part of this grid in, whose first cell is the cell `first` of this one; false where it does not lie within,
-    /// and nothing is put in.
+    /// Puts a part of this grid in, whose first cell is the cell `first` of this one; false where it does not lie
+    /// within, and nothing is put in.
     pub fn put(&mut self, first: [usize; 2], part: &Self) -> bool {
         let fits =
             |axis: usize| first[axis].checked_add(part.size[axis]).is_some_and(|end| end <= self.size[axis]);

@@ -159,7 +159,7 @@ impl SeenMap {
         let center_m = self.map.lattice().center_m(voxel, level);
         let mut viewpoints =
             self.scans.iter().filter(|scan| !scan.is_undone).flat_map(|scan| &scan.viewpoint);
-        viewpoints.any(|viewpoint| viewpoint.sees_through(center_m))
+        viewpoints.any(|viewpoint| viewpoint.is_free(center_m))
     }
 
     /// True where a voxel is free: seen through, and not occupied.

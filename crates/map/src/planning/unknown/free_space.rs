@@ -1,7 +1,7 @@
 //! Free space: generated on demand from where scans saw through (paper III-B), voxel by voxel of any level.
 
 use crate::map::MapView;
-use crate::visibility::{Gaze, ViewpointSet};
+use crate::visibility::{ViewpointCache, ViewpointSet};
 use crate::voxel::{BlockMask, Cell, Lattice, VoxelKey};
 
 /// Cells of a block.
@@ -18,21 +18,21 @@ pub(in crate::planning) struct FreeSpace<'a> {
     lattice: &'a Lattice,
     /// None where the view has no viewpoints: nothing was seen through.
     viewpoints: Option<&'a ViewpointSet>,
-    gaze: Option<Gaze<'a>>,
+    cache: Option<ViewpointCache<'a>>,
 }
 
 impl<'a> FreeSpace<'a> {
     /// What the scans of a view's map saw through.
     pub(in crate::planning) fn of(view: &'a MapView<'_>) -> Self {
         let viewpoints = view.viewpoints().map(|viewpoints| &**viewpoints).filter(|all| !all.is_empty());
-        Self { lattice: view.lattice(), viewpoints, gaze: viewpoints.map(ViewpointSet::gaze) }
+        Self { lattice: view.lattice(), viewpoints, cache: viewpoints.map(ViewpointSet::cache) }
     }
 
     /// True where a scan saw through the center of `voxel` of `level`.
     #[inline]
     pub(in crate::planning) fn is_seen_through(&mut self, voxel: VoxelKey, level: u32) -> bool {
         let center_m = self.lattice.center_m(voxel, level);
-        self.gaze.as_mut().is_some_and(|gaze| gaze.sees_through(center_m))
+        self.cache.as_mut().is_some_and(|cache| cache.is_free(center_m))
     }
 
     /// The voxels of `level` in `block` that were seen through, but for those of `but`.
@@ -53,7 +53,7 @@ impl<'a> FreeSpace<'a> {
         let of_cell = |n: u16| self.lattice.center_m(Cell::from_bits(n).voxel(block), level);
         for viewpoint in viewpoints.within(of_cell(0), of_cell(CELLS - 1)) {
             left.retain(|(cell, center_m)| {
-                let is_seen = viewpoint.sees_through(*center_m);
+                let is_seen = viewpoint.is_free(*center_m);
                 if is_seen {
                     seen.insert(*cell);
                 }

@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use super::coordinates::Coordinates;
 use super::error::ReadError;
 use super::format::Format;
+use super::natural::compare_names;
 use super::supported::FILE_BYTES_MAX;
 use crate::geometry::Point;
 
@@ -48,11 +49,12 @@ pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> 
     Format::named_by(path)?.points(bytes).map_err(|problem| problem.in_file(path))
 }
 
-/// The scan files that `paths` name: a directory gives its scan files sorted by name, a file itself.
+/// The scan files that `paths` name: a directory gives its scan files in the natural order of
+/// their names (scan2 before scan10), a file itself.
 ///
 /// # Errors
-/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read, or
-/// a directory has no scan file.
+/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read,
+/// or a directory has no scan file.
 pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for path in paths {
@@ -77,7 +79,7 @@ fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if files.is_empty() {
         return Err(ReadError::Empty { path: directory.to_owned() });
     }
-    files.sort();
+    files.sort_by(|a, b| compare_names(a, b));
     Ok(files)
 }
 

@@ -10,6 +10,7 @@ mod error;
 mod files;
 mod format;
 mod lines;
+mod natural;
 mod pcd;
 mod ply;
 mod supported;

@@ -87,7 +87,8 @@ fn names(text: &str) -> Option<Names> {
     Some(Names { columns, count: names.len() })
 }
 
-/// The cells of a line. Semicolons and commas separate even after nothing: an empty cell is an error, not a shifted column.
+/// The cells of a line. Semicolons and commas separate even after nothing: an empty cell is an error, not a shifted
+/// column.
 fn cells(text: &str) -> Box<dyn Iterator<Item = &str> + '_> {
     match [';', ','].into_iter().find(|separator| text.contains(*separator)) {
         Some(separator) => {

@@ -18,9 +18,9 @@ fn what_lies_behind_the_robots_own_parts_is_not_seen() {
     for i in 0..100 {
         let (x, aside) = (0.6 + i as f32 * 0.07, (i % 9) as f32 / 8.0 - 0.5);
         let behind = [x, aside * 0.06 * x, 0.02];
-        assert!(!image.sees_through(behind), "{behind:?}");
+        assert!(!image.is_free(behind), "{behind:?}");
     }
-    assert!(image.sees_through([0.4, 0.0, 0.0]) && image.sees_through([4.0, 1.0, 0.0]));
+    assert!(image.is_free([0.4, 0.0, 0.0]) && image.is_free([4.0, 1.0, 0.0]));
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn pixels_are_seen_where_points_lie_all_over_them_and_not_where_many_lie_togethe
                 ((i as f32).to_radians().sin_cos(), up_deg.to_radians().sin_cos());
             [5.0 * level * cos, 5.0 * level * sin, 5.0 * up]
         });
-        let seen = far_from_rays.filter(|&offset| image.sees_through(offset)).count();
+        let seen = far_from_rays.filter(|&offset| image.is_free(offset)).count();
         assert_eq!(seen, 0, "of 720 places, with {} points", points.len());
     }
     // A hole of 7 degrees in what else is dense.
@@ -59,24 +59,24 @@ fn pixels_are_seen_where_points_lie_all_over_them_and_not_where_many_lie_togethe
     let whole = RangeImage::of_points(&dense, RANGE, IMAGE_BYTES_MAX).unwrap();
     for (y, z) in (-10..=10).flat_map(|y| (-10..=10).map(move |z| (y, z))) {
         let offset = [5.0, y as f32 * 0.01, z as f32 * 0.01];
-        assert!(!image.sees_through(offset) && whole.sees_through(offset), "{offset:?}");
+        assert!(!image.is_free(offset) && whole.is_free(offset), "{offset:?}");
     }
 }
 
 #[test]
 fn nothing_thinner_than_rays_are_apart_is_seen_well_beyond() {
-    let least = WellBeyond { margin_m: 0.3, gap_max_m: 0.1 };
+    let least = AbsenceEvidence { margin_m: 0.3, gap_max_m: 0.1 };
     for (step_deg, sees_m) in [(0.4f64, 8.0f32), (1.2, 3.0)] {
         let image =
             RangeImage::of_points(&window(40.0, 20.0, step_deg, |_| 20.0), RANGE, IMAGE_BYTES_MAX).unwrap();
         let apart_m = (step_deg.to_radians() as f32) * sees_m;
-        assert!(image.sees_through([sees_m * 1.5, 0.1, 0.1]));
+        assert!(image.is_free([sees_m * 1.5, 0.1, 0.1]));
         assert!(
-            image.sees_well_beyond([sees_m * 0.4, 0.1, 0.1], least),
+            image.proves_absent([sees_m * 0.4, 0.1, 0.1], least),
             "at {sees_m} m rays are {apart_m} m apart"
         );
         assert!(
-            !image.sees_well_beyond([sees_m * 2.0, 0.1, 0.1], least),
+            !image.proves_absent([sees_m * 2.0, 0.1, 0.1], least),
             "at {sees_m} m rays are {apart_m} m apart"
         );
     }
@@ -100,7 +100,7 @@ fn images_of_before_are_read() {
 
 #[test]
 fn what_stands_where_rays_were_missing_is_not_seen_well_beyond() {
-    let least = WellBeyond { margin_m: 0.3, gap_max_m: 0.1 };
+    let least = AbsenceEvidence { margin_m: 0.3, gap_max_m: 0.1 };
     // Rays 0.35 degrees apart all around, but for a band of dead rings.
     for gap_deg in [1.4f64, 2.1, 2.8, 3.5] {
         let lies_in_gap = |point: &&Point| {
@@ -118,9 +118,9 @@ fn what_stands_where_rays_were_missing_is_not_seen_well_beyond() {
                 let ((sin, cos), up) =
                     (f64::from(azimuth_deg).to_radians().sin_cos(), up_deg.to_radians().tan());
                 let place = [7.0 * cos, 7.0 * sin, 7.0 * up].map(|c| c as f32);
-                assert!(!gaping.sees_well_beyond(place, least), "{place:?} in a gap of {gap_deg} degrees");
+                assert!(!gaping.proves_absent(place, least), "{place:?} in a gap of {gap_deg} degrees");
                 asked += 1;
-                kept += usize::from(whole.sees_well_beyond(place, least));
+                kept += usize::from(whole.proves_absent(place, least));
             }
             assert!(kept * 10 >= asked * 9, "{kept} of {asked} where no ring is dead");
         }
@@ -172,7 +172,8 @@ fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() 
 struct Holed {
     /// Degrees between its rays, to the side and up.
     step_deg: [f32; 2],
-    /// Degrees from one ray to the next one on the other side of the hole, to the side and up; without end where rings are dead.
+    /// Degrees from one ray to the next one on the other side of the hole, to the side and up; without end where rings
+    /// are dead.
     hole_deg: [f32; 2],
     yaw_deg: f32,
 }
@@ -203,7 +204,7 @@ impl Holed {
 fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let voxel_m = 0.1;
-    let well_beyond = WellBeyond { margin_m: 3.0 * voxel_m, gap_max_m: voxel_m };
+    let well_beyond = AbsenceEvidence { margin_m: 3.0 * voxel_m, gap_max_m: voxel_m };
     let (mut asked, mut seen, mut well_seen) = (0, 0, 0);
     let sensors = [
         ([0.2, 1.0], [f32::INFINITY, 2.0], "a dead ring"),
@@ -231,10 +232,10 @@ fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
                     let place = at(up * hole_deg[1]);
                     let what = format!("{place:?} in {name} {voxels_wide} voxels wide, turned by {yaw_deg}");
                     assert!(voxels_wide < 2.0 || !sees_through(place), "{what}");
-                    assert!(!image.sees_well_beyond(place, well_beyond), "{what}");
+                    assert!(!image.proves_absent(place, well_beyond), "{what}");
                     asked += 1;
                     seen += usize::from(sees_through(at(7.0)));
-                    well_seen += usize::from(image.sees_well_beyond(at(7.0), well_beyond));
+                    well_seen += usize::from(image.proves_absent(at(7.0), well_beyond));
                 }
             }
         }
@@ -247,7 +248,7 @@ fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
 fn what_is_gone_is_seen_well_beyond_though_rays_are_lost() {
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let voxel_m = 0.1f32;
-    let well_beyond = WellBeyond { margin_m: 0.3, gap_max_m: voxel_m };
+    let well_beyond = AbsenceEvidence { margin_m: 0.3, gap_max_m: voxel_m };
     for (step_deg, lost) in [(0.4, u32::MAX), (0.4, 500), (0.4, 100), (0.7, 100)] {
         let sensor = Holed { step_deg: [step_deg; 2], hole_deg: [0.0; 2], yaw_deg: 0.0 };
         let points = sensor.scan(lost, &mut random);
@@ -258,7 +259,7 @@ fn what_is_gone_is_seen_well_beyond_though_rays_are_lost() {
         for _ in 0..500 {
             let at_deg = [22.0f32, 7.0].map(|most| random.random_range(-most..most));
             let place = sensor.direction(at_deg).map(|c| c * distance_m);
-            seen += usize::from(image.sees_well_beyond(place, well_beyond));
+            seen += usize::from(image.proves_absent(place, well_beyond));
         }
         assert!(seen >= 400, "{seen} of 500 places, rays {step_deg} degrees apart, one in {lost} lost");
     }
@@ -306,7 +307,7 @@ fn where_rays_ran_on_is_free_and_says_nothing_of_what_was_met() {
         "images of which all was met are as they were"
     );
     let place = [6.0, 2.0, 0.3];
-    assert!(image.sees_through(place) && all_met.sees_through(place));
+    assert!(image.is_free(place) && all_met.is_free(place));
     assert_eq!(all_met.sight(place, 0.1), Sight::Contradicts);
     assert_eq!(image.sight(place, 0.1), Sight::NotSeen);
     assert_eq!(image.sight([4.0, -2.0, 0.3], 0.1), Sight::Contradicts, "the wall was met");

@@ -18,12 +18,12 @@ fn an_image_tells_up_to_the_wall_and_never_beyond() {
     let mut before = 0;
     for point in &points {
         let beyond = point.xyz().map(|c| c * 1.001);
-        assert!(!image.sees_through(beyond), "{point:?} was seen through");
-        before += usize::from(image.sees_through(point.xyz().map(|c| c * 0.95)));
+        assert!(!image.is_free(beyond), "{point:?} was seen through");
+        before += usize::from(image.is_free(point.xyz().map(|c| c * 0.95)));
     }
     assert!(before * 100 > points.len() * 97, "{before} of {}", points.len());
     // Nothing was seen behind the sensor.
-    assert!(!image.sees_through([-0.5, 0.0, 0.0]));
+    assert!(!image.is_free([-0.5, 0.0, 0.0]));
 }
 
 #[test]
@@ -80,9 +80,9 @@ fn a_ball_is_seen_through_only_where_all_of_it_is() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let surface = ScanSurface::of(ScanRays::met(&half_hidden(&mut random)), SURFACE).unwrap();
     let sees_through = |offset| surface.sees_through(offset, 0.05, 0.1);
-    assert!(sees_through([2.0, -0.5, 0.1]) && surface.sees_beyond([2.0, -0.5, 0.1], 0.05));
+    assert!(sees_through([2.0, -0.5, 0.1]) && surface.depth_exceeds([2.0, -0.5, 0.1], 0.05));
     assert!(
-        !sees_through([2.0, 0.5, 0.1]) && !surface.sees_beyond([2.0, 0.5, 0.1], 0.05),
+        !sees_through([2.0, 0.5, 0.1]) && !surface.depth_exceeds([2.0, 0.5, 0.1], 0.05),
         "behind the plate"
     );
     assert!(!sees_through([2.0, -0.02, 0.1]), "at the plate's rim");
@@ -95,7 +95,8 @@ fn a_ball_is_seen_through_only_where_all_of_it_is() {
 #[test]
 fn samples_leave_no_gap_wider_than_their_spacing_and_join_no_rims() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    // Points farther apart than samples, which only a surface at a sharper angle than half a radian would join to the plate.
+    // Points farther apart than samples, which only a surface at a sharper angle than half a radian would join to the
+    // plate.
     let points: Vec<_> = half_hidden(&mut random).into_iter().step_by(40).collect();
     let surface =
         ScanSurface::of(ScanRays::met(&points), SurfaceSettings { grazing_rad: 0.5, ..SURFACE }).unwrap();
@@ -146,13 +147,13 @@ fn a_set_says_of_every_point_what_its_viewpoints_say() {
             }
         }
         assert_eq!(set.len(), all.len());
-        let (mut gaze, mut seen) = (set.gaze(), 0);
+        let (mut cache, mut seen) = (set.cache(), 0);
         for _ in 0..4000 {
             let mut any = || random.random_range(-15.0..15.0);
             let point = [any(), any(), any()];
-            let expected = all.iter().any(|(_, viewpoint)| viewpoint.sees_through(point));
-            assert_eq!(set.sees_through(point), expected, "{point:?}");
-            assert_eq!(gaze.sees_through(point), expected, "{point:?}");
+            let expected = all.iter().any(|(_, viewpoint)| viewpoint.is_free(point));
+            assert_eq!(set.is_free(point), expected, "{point:?}");
+            assert_eq!(cache.is_free(point), expected, "{point:?}");
             seen += usize::from(expected);
         }
         assert!((100..3900).contains(&seen), "{seen} seen: the test says nothing");
@@ -208,7 +209,7 @@ fn a_scan_of_points_far_from_each_other_says_little_and_nothing_far_from_its_ray
         for distance in [2.0f32, 5.0, 9.0] {
             let aside = distance * 0.03;
             for offset in [[distance, 0.0, aside], [distance, 0.0, -aside]] {
-                assert!(!image.sees_through(offset), "{offset:?} of {} points", points.len());
+                assert!(!image.is_free(offset), "{offset:?} of {} points", points.len());
             }
         }
     }
@@ -221,7 +222,7 @@ fn a_scan_of_points_far_from_each_other_says_little_and_nothing_far_from_its_ray
         |a: [f32; 3], b: [f32; 3]| nalgebra::Vector3::from(a).angle(&nalgebra::Vector3::from(b)).to_degrees();
     let far_from_rays = (0..2000).filter(|_| {
         let place = [any(), any(), any()].map(|c| c * 0.2);
-        image.sees_through(place) && sparse.iter().all(|point| angle_deg(point.xyz(), place) > 3.0)
+        image.is_free(place) && sparse.iter().all(|point| angle_deg(point.xyz(), place) > 3.0)
     });
     let count = far_from_rays.count();
     assert!(count < 20, "{count} of 2000 places are more than 3 degrees from all rays and seen");
@@ -229,7 +230,8 @@ fn a_scan_of_points_far_from_each_other_says_little_and_nothing_far_from_its_ray
 
 #[test]
 fn nothing_is_seen_behind_points_that_are_too_few_to_tell_more() {
-    // Six points for each pixel of a scan all around at 8 m: coarse pixels, of which each needs some points to count as seen.
+    // Six points for each pixel of a scan all around at 8 m: coarse pixels, of which each needs some points to count as
+    // seen.
     let pixels = 40;
     let at = |i: usize, aside: f32| (i as f32 + 0.5 + aside) / pixels as f32 * 2.0 - 1.0;
     let aside = [-0.4f32, 0.0, 0.4].map(|u| [[u, -0.3], [u, 0.3]]);
@@ -258,10 +260,7 @@ fn nothing_is_seen_behind_points_that_are_too_few_to_tell_more() {
         let near = there.iter().take(few).map(|point| Point::from(point.xyz().map(|c| c / 4.0)));
         let scan: Vec<Point> = elsewhere.iter().copied().chain(near).collect();
         let image = RangeImage::of_points(&scan, RANGE, IMAGE_BYTES_MAX).unwrap();
-        assert!(!image.sees_through([4.0, 0.1, 0.1]), "{few} points");
-        assert!(
-            image.sees_through([1.5, 0.0375, 0.0375]) && image.sees_through([4.0, 0.3, 0.1]),
-            "{few} points"
-        );
+        assert!(!image.is_free([4.0, 0.1, 0.1]), "{few} points");
+        assert!(image.is_free([1.5, 0.0375, 0.0375]) && image.is_free([4.0, 0.3, 0.1]), "{few} points");
     }
 }

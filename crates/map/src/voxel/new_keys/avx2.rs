@@ -22,8 +22,8 @@ pub(super) fn keys_gained(
     up: u32,
     keys: &mut Vec<u64>,
 ) {
-    // Each step writes a whole register, however few keys it keeps.
-    // SAFETY: the token says that the CPU has the features; a key a cell is written at most, and a register behind them.
+    // Each step writes a whole register, however few keys it keeps. SAFETY: the token says that the CPU has the
+    // features; a key a cell is written at most, and a register behind them.
     unsafe { append(keys, LANES, |keys| write_keys_gained(before, added, first, up, keys)) }
 }
 

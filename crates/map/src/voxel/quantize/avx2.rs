@@ -74,8 +74,8 @@ impl Quantizer {
         }
     }
 
-    /// Indices of the level of up to eight points, axis by axis, and a bit for each that has a voxel: the SIMD variant of
-    /// [`LatticeFromPoints::index`].
+    /// Indices of the level of up to eight points, axis by axis, and a bit for each that has a voxel: the SIMD variant
+    /// of [`LatticeFromPoints::index`].
     ///
     /// # Safety
     /// Needs AVX2.

@@ -60,8 +60,8 @@ impl Quantizer {
         }
     }
 
-    /// Indices of the level of up to sixteen points, axis by axis, and a bit for each that has a voxel: the SIMD variant
-    /// of [`LatticeFromPoints::index`].
+    /// Indices of the level of up to sixteen points, axis by axis, and a bit for each that has a voxel: the SIMD
+    /// variant of [`LatticeFromPoints::index`].
     ///
     /// # Safety
     /// Needs AVX-512 F.

@@ -14,7 +14,8 @@ use mrol_map::map::RobotName;
 
 /// Work of this long and longer is charged twice what the shortest is.
 const LONG_WORK: Duration = Duration::from_millis(100);
-/// Jobs of one asker that were begun and gave way: with so many, no other of its jobs is begun before one of them ended.
+/// Jobs of one asker that were begun and gave way: with so many, no other of its jobs is begun before one of them
+/// ended.
 const PAUSED_PER_ASKER_MAX: usize = 4;
 /// Threads and their queue. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
@@ -94,8 +95,8 @@ impl FairQueue {
         (state.running, state.waiting)
     }
 
-    /// The same queue, which gives out at most `threads` threads at once while others have precedence, and at least one.
-    /// Jobs in hand go on.
+    /// The same queue, which gives out at most `threads` threads at once while others have precedence, and at least
+    /// one. Jobs in hand go on.
     #[must_use]
     pub(in crate::work) fn giving_precedence(self, precedence: Precedence, threads: usize) -> Self {
         self.0.lock().behind = Some((precedence, threads));
@@ -158,7 +159,7 @@ impl FairQueue {
         while state.has_free() {
             let Some((next, ticket)) = state.next() else { return };
             if let Err(mut refused) = ticket.give.send(self.held_by(&next)) {
-                // Who waited has just gone: the thread goes on to the next.
+                // The waiter has just gone: the thread goes on to the next.
                 refused.whose = None;
                 state.end(&next, Duration::ZERO);
             }
@@ -244,7 +245,7 @@ impl State {
 
     /// Refuses the last job of somebody who has two more waiting than `asker`, where all places are taken.
     fn make_place_for(&mut self, asker: &Asker) -> Result<(), Full> {
-        // Those who gave way were let in before.
+        // Jobs that gave way were let in before.
         if self.waiting - self.paused < self.waiting_max {
             return Ok(());
         }

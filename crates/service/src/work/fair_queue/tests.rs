@@ -39,7 +39,7 @@ fn taken(queue: &FairQueue, requester: &Requester) -> HeldThread {
     given(&mut wanted).unwrap().unwrap()
 }
 
-/// Somebody who waits for a thread from now on.
+/// A job that waits for a thread from now on.
 fn waits<'a>(queue: &'a FairQueue, requester: &'a Requester) -> Wanted<'a> {
     let mut wanted: Wanted<'a> = Box::pin(queue.take(requester));
     assert!(given(&mut wanted).is_none());
@@ -74,7 +74,7 @@ fn askers_take_turns_and_each_is_served_in_order() {
     let names = ["many 1", "many 2", "many 3", "two 1", "two 2", "one"];
     let who = [&many, &many, &many, &two, &two, &one];
     let waiting = names.into_iter().zip(who.map(|who| waits(&queue, who))).collect();
-    // Who has had the thread is last in the row.
+    // The caller that has had the thread is last in the row.
     assert_eq!(turns(held, waiting), ["two 1", "one", "many 1", "two 2", "many 2", "many 3"]);
     assert!(is_empty(&queue));
 }
@@ -275,7 +275,7 @@ proptest! {
                 }
                 i = 0;
             }
-            // Those who have a thread are served, whatever else they wait for.
+            // Jobs that have a thread are served, whatever else they wait for.
             for one in &mut waiting {
                 let is_first = held.iter().all(|(who, _)| who.asker != one.who.asker);
                 if !is_first {

@@ -1,13 +1,15 @@
-//! The collision-affording point tree `capt` on the voxels and arms of `mrol-lab bench planning --peer-file`, one thread.
+//! The collision-affording point tree `capt` on the voxels and arms of `mrol-lab bench planning --peer-file`, one
+//! thread.
 //!
 //! ```text
 //! mrol-lab bench planning --scans 0 --peer-file target/arms.bin
 //! cargo run --release --manifest-path crates/lab/benches/peers/capt/Cargo.toml -- target/arms.bin
 //! ```
 //!
-//! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. The tree holds the centers of voxels, as balls of half a
-//! voxel's side: less than the cubes, so that an arm that it finds colliding collides, and some that collide it does not
-//! find. Prints nanoseconds a pose, the median of some passes after one that is not timed; and how the answers compare.
+//! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. The tree holds the centers of voxels, as balls
+//! of half a voxel's side: less than the cubes, so that an arm that it finds colliding collides, and some that collide
+//! it does not find. Prints nanoseconds a pose, the median of some passes after one that is not timed; and how the
+//! answers compare.
 
 #![cfg_attr(feature = "simd", feature(portable_simd))]
 

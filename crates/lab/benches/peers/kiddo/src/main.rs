@@ -5,9 +5,9 @@
 //! cargo run --release --manifest-path crates/lab/benches/peers/kiddo/Cargo.toml -- target/points.bin
 //! ```
 //!
-//! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. Prints nanoseconds a point, the median of some passes after
-//! one that is not timed: of the search for the nearest center however far it is, and of that within the radius; and the
-//! largest difference of the distances within the radius.
+//! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. Prints nanoseconds a point, the median of some
+//! passes after one that is not timed: of the search for the nearest center however far it is, and of that within the
+//! radius; and the largest difference of the distances within the radius.
 
 use std::hint::black_box;
 use std::num::NonZeroUsize;
@@ -68,7 +68,8 @@ impl Peer {
         Some(Self { radius_m, centers, points, distances_m })
     }
 
-    /// Of the distances in the file to those found, infinite where the file has one beyond the radius or lacks one within.
+    /// Of the distances in the file to those found, infinite where the file has one beyond the radius or lacks one
+    /// within.
     fn largest_difference_m(&self, squared: &[f32]) -> f64 {
         let pairs = self.distances_m.iter().zip(squared);
         let difference = |(&told, &squared): (&f32, &f32)| {

@@ -101,7 +101,8 @@ pub(super) struct Verdict {
     /// Memory of the server with replicas against without; with one more that reads nothing against without that one.
     memory_of_watching: f64,
     memory_of_stalled: f64,
-    /// Lag of replicas beside one that reads nothing against without that one, 99 of 100; and the time of a scan, half of them.
+    /// Lag of replicas beside one that reads nothing against without that one, 99 of 100; and the time of a scan, half
+    /// of them.
     lag_of_stalled: f64,
     scan_of_stalled: f64,
     /// Copies of all replicas that a restart of the server made, and that a journal made which is too short.

@@ -19,7 +19,7 @@ use mrol::console::error::CliError;
 const TURNS: usize = 50;
 /// How long replicas may take to have what was acknowledged.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Who reads nothing is kept for the whole stage.
+/// Watchers that read nothing are kept for the whole stage.
 const SETTINGS: [(&str, &str); 1] = [("MROL_LIMITS__WATCH_UNREAD_MAX_S", "3600")];
 /// With these nothing is kept of the journal but what the newest two snapshots need,
 const SHORT_JOURNAL: [(&str, &str); 2] =
@@ -27,7 +27,7 @@ const SHORT_JOURNAL: [(&str, &str); 2] =
 /// of which each end of a server writes one.
 const STARTS_AWAY: usize = 3;
 
-/// A server with a map that is mapped, and who follows it.
+/// A server with a map that is mapped, and its watchers.
 pub(super) struct Stage {
     data: PathBuf,
     server: ServerProcess,
@@ -109,7 +109,8 @@ impl Stage {
         self.line(name, mapping.end().await?, None).await
     }
 
-    /// Lets the server work elsewhere until its journal does not reach back to what the replicas have, and then come back.
+    /// Lets the server work elsewhere until its journal does not reach back to what the replicas have, and then come
+    /// back.
     pub(super) async fn away(&mut self, name: &'static str, time: Duration) -> Result<Line, FleetError> {
         for _ in 0..STARTS_AWAY {
             self.server.stop().await?;

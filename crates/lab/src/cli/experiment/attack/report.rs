@@ -42,6 +42,7 @@ pub(super) struct Waited {
     left_out: u64,
     errors: u64,
     p50_ms: f64,
+    p95_ms: f64,
     p99_ms: f64,
     p999_ms: f64,
     max_ms: f64,
@@ -64,20 +65,22 @@ impl Waited {
             left_out: (due as u64).saturating_sub(tally.operations()),
             errors: tally.error_count(),
             p50_ms: tally.quantile_ms(0.5),
+            p95_ms: tally.quantile_ms(0.95),
             p99_ms: tally.quantile_ms(0.99),
             p999_ms: tally.quantile_ms(0.999),
             max_ms: tally.quantile_ms(1.0),
         }
     }
 
-    fn cells(&self) -> [String; 7] {
+    fn cells(&self) -> [String; 8] {
         let ms = |ms: f64| format!("{ms:.2}");
-        let Self { requests, left_out, errors, p50_ms, p99_ms, p999_ms, max_ms } = *self;
+        let Self { requests, left_out, errors, p50_ms, p95_ms, p99_ms, p999_ms, max_ms } = *self;
         [
             requests.to_string(),
             left_out.to_string(),
             errors.to_string(),
             ms(p50_ms),
+            ms(p95_ms),
             ms(p99_ms),
             ms(p999_ms),
             ms(max_ms),
@@ -87,7 +90,7 @@ impl Waited {
 
 impl Line {
     pub(super) const HEAD: &str = "\
-caller                          alone: p50      p99      max   attacked: p50      p99    p99.9      max   p99 x  left out   errors";
+caller                          alone: p50      p95      p99      max   attacked: p50      p95      p99    p99.9      max   p99 x  left out   errors";
 
     /// A line for each caller, of tallies and how long they took, seconds.
     pub(super) fn all(
@@ -106,11 +109,12 @@ caller                          alone: p50      p99      max   attacked: p50    
 impl Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { caller, alone, attacked, times_p99 } = self;
-        write!(f, "{caller:<28} {:>13.1} {:>8.1} {:>8.1}", alone.p50_ms, alone.p99_ms, alone.max_ms)?;
-        let Waited { p50_ms, p99_ms, p999_ms, max_ms, left_out, errors, .. } = attacked;
+        let Waited { p50_ms, p95_ms, p99_ms, max_ms, .. } = alone;
+        write!(f, "{caller:<28} {p50_ms:>13.1} {p95_ms:>8.1} {p99_ms:>8.1} {max_ms:>8.1}")?;
+        let Waited { p50_ms, p95_ms, p99_ms, p999_ms, max_ms, left_out, errors, .. } = attacked;
         write!(
             f,
-            " {p50_ms:>15.1} {p99_ms:>8.1} {p999_ms:>8.1} {max_ms:>8.1} {times_p99:>7.1} {left_out:>9} {errors:>8}"
+            " {p50_ms:>15.1} {p95_ms:>8.1} {p99_ms:>8.1} {p999_ms:>8.1} {max_ms:>8.1} {times_p99:>7.1} {left_out:>9} {errors:>8}"
         )
     }
 }
@@ -154,7 +158,10 @@ impl Goals {
 /// Writes `attack.csv` with the callers, and `attack.md` with callers and attacks.
 pub(super) fn write(lines: &[Line], damages: &[Damage], out: &Path) -> Result<(), ReportError> {
     folder(out)?;
-    let head = ["caller", "phase", "requests", "left_out", "errors", "p50_ms", "p99_ms", "p999_ms", "max_ms"];
+    let head = [
+        "caller", "phase", "requests", "left_out", "errors", "p50_ms", "p95_ms", "p99_ms", "p999_ms",
+        "max_ms",
+    ];
     let mut callers = Table::new(head);
     for Line { caller, alone, attacked, .. } in lines {
         for (phase, waited) in [("alone", alone), ("attacked", attacked)] {

@@ -156,8 +156,8 @@ fn find(slots: Slots<'_>, key: u64, bucket: usize) -> Option<usize> {
 /// Bits of a cell's number in its block, behind which that of the block in its cluster begins.
 const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
 
-/// The SIMD variant of [`Cell::of`] and `BlockInCluster::of`: cluster indices, and numbers of cells within clusters, of the voxels of a
-/// level `up` levels up in its blocks.
+/// The SIMD variant of [`Cell::of`] and `BlockInCluster::of`: cluster indices, and numbers of cells within clusters, of
+/// the voxels of a level `up` levels up in its blocks.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn split(index: &[[i32; BATCH]; 3], up: u32) -> ([[i32; BATCH]; 3], [i32; BATCH]) {

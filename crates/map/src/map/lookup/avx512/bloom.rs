@@ -8,8 +8,8 @@ use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
 use crate::map::lookup::level_view::LevelView;
 use crate::voxel::quantize::avx512::{LANES, halves, lanes};
 
-/// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says. With `FETCH`, words are fetched as soon
-/// as they are located.
+/// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says. With `FETCH`, words are fetched as
+/// soon as they are located.
 pub(super) struct Bloom<const HASHES: u32, const FETCH: bool>;
 
 pub(super) struct BloomRegisters {

@@ -60,8 +60,8 @@ pub(super) struct ExactMemory {
     results: ([u64; QUEUE], [u64; QUEUE]),
 }
 
-/// Stands for the clusters of points without a voxel; no key sets bit 63. Where it is sought it may be found, in a vacant
-/// slot, without a block.
+/// Stands for the clusters of points without a voxel; no key sets bit 63. Where it is sought it may be found, in a
+/// vacant slot, without a block.
 const NO_CLUSTER: __m512i = eight_of(u64::MAX);
 impl Default for ExactMemory {
     /// Known is what is not there.

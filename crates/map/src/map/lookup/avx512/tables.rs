@@ -127,7 +127,8 @@ fn absent() -> __m512i {
 /// Keys of clusters and their shards in one: a cluster of coarse voxels is larger than a region, and each of several
 /// shards has a part of it.
 ///
-/// The shard goes where a cluster's key only repeats the sign of z, since its indices have five bits fewer than a voxel's.
+/// The shard goes where a cluster's key only repeats the sign of z, since its indices have five bits fewer than a
+/// voxel's.
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) fn within_shard(keys: __m512i, shards: __m512i) -> __m512i {

@@ -11,7 +11,8 @@ use crate::geometry::Pose;
 const CELLS_OF_REACH: f64 = 8.0;
 /// Largest index of a cell that a viewpoint is in, and some more.
 const CELL_INDEX_MAX: f64 = (1 << 30) as f64;
-/// Bytes of a cell in the index of which one viewpoint alone takes care: a list in a table that is half full, with room for four.
+/// Bytes of a cell in the index of which one viewpoint alone takes care: a list in a table that is half full, with room
+/// for four.
 const INDEX_BYTES: usize = 112;
 /// Steps along a ray within a cell.
 const STEPS_A_CELL: f64 = 2.0;
@@ -23,11 +24,11 @@ pub(super) type Slot = u32;
 
 /// The viewpoints that may have looked into each cell of space, so that a point asks few of them.
 ///
-/// Cells are cubes, an eighth as wide as a viewpoint reaches or up to twice that: a power of two in meters, with a grid for each. So a
-/// viewpoint is in some hundred cells, whether it saw a room or a street. A cell names every viewpoint that saw a
-/// point of it, first those that saw most.
+/// Cells are cubes, an eighth as wide as a viewpoint reaches or up to twice that: a power of two in meters, with a grid
+/// for each. So a viewpoint is in some hundred cells, whether it saw a room or a street. A cell names every viewpoint
+/// that saw a point of it, first those that saw most.
 #[derive(Debug, Clone, Default)]
-pub(super) struct ReachIndex {
+pub(super) struct CoverageIndex {
     /// By the exponent of the cells' side.
     grids: BTreeMap<i32, HashMap<CellIndex, Vec<Entry>>>,
 }
@@ -42,12 +43,12 @@ struct Entry {
 
 /// The cells that a viewpoint looked into.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reach {
+pub(super) struct Coverage {
     exponent: i32,
     cells: Vec<(CellIndex, u32)>,
 }
 
-impl Reach {
+impl Coverage {
     /// The cells with a point that was seen from `map_from_sensor`, as `image` tells, and some beside.
     pub(super) fn of(map_from_sensor: &Pose, image: &RangeImage) -> Self {
         let origin: [f64; 3] = map_from_sensor.translation.vector.into();
@@ -94,19 +95,19 @@ fn box_m(exponent: i32, cell: CellIndex) -> [[f64; 3]; 2] {
     [0.0, 1.0].map(|end| cell.map(|i| (f64::from(i) + end) * side_m))
 }
 
-impl ReachIndex {
-    pub(super) fn insert(&mut self, slot: Slot, reach: &Reach) {
-        let grid = self.grids.entry(reach.exponent).or_default();
-        for &(cell, weight) in &reach.cells {
+impl CoverageIndex {
+    pub(super) fn insert(&mut self, slot: Slot, coverage: &Coverage) {
+        let grid = self.grids.entry(coverage.exponent).or_default();
+        for &(cell, weight) in &coverage.cells {
             let entries = grid.entry(cell).or_default();
             let place = entries.partition_point(|entry| entry.weight >= weight);
             entries.insert(place, Entry { slot, weight });
         }
     }
 
-    pub(super) fn remove(&mut self, slot: Slot, reach: &Reach) {
-        let Some(grid) = self.grids.get_mut(&reach.exponent) else { return };
-        for (cell, _) in &reach.cells {
+    pub(super) fn remove(&mut self, slot: Slot, coverage: &Coverage) {
+        let Some(grid) = self.grids.get_mut(&coverage.exponent) else { return };
+        for (cell, _) in &coverage.cells {
             if let Some(entries) = grid.get_mut(cell) {
                 entries.retain(|entry| entry.slot != slot);
                 if entries.is_empty() {
@@ -115,7 +116,7 @@ impl ReachIndex {
             }
         }
         if grid.is_empty() {
-            self.grids.remove(&reach.exponent);
+            self.grids.remove(&coverage.exponent);
         }
     }
 
@@ -152,7 +153,7 @@ impl ReachIndex {
     }
 
     /// True where a viewpoint may have looked into a box; of one that is large against the cells this is always said.
-    pub(super) fn may_look_into(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
+    pub(super) fn may_cover(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
         const CELLS_MAX: i64 = 64;
         self.grids.iter().any(|(&exponent, grid)| {
             let cell = |c: f64| (c / 2f64.powi(exponent)).floor() as i32;
