@@ -78,8 +78,8 @@ impl MapService {
         if let Some(judged) = self.submit_and_wait(of, (mapping, &requester), None, at_first).await? {
             return Ok(judged);
         }
-        // What keeps failing gives way to what may succeed: its threads are nice, and while others have work they
-        // hardly run. A robot of which a scan takes long now and then waits for turns, and not for idle cores.
+        // What keeps failing gives way to what may succeed: it has a lane of its own, with half of the threads. A robot
+        // of which a scan takes long now and then waits for turns of the others.
         let lane = if long_mapping.is_failing(&requester) { long_mapping } else { mapping };
         let thread = limit.wait(lane.thread(&requester)).await??;
         let judged = self.submit_and_wait(of, (lane, &requester), Some(thread), submit(Effort::Whole)).await;

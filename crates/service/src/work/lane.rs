@@ -30,8 +30,6 @@ pub(super) struct LaneSettings {
     pub(super) name: &'static str,
     /// Threads that have jobs at once.
     pub(super) threads: usize,
-    /// How much nicer they are than the process; 0 for as it is.
-    pub(super) niceness: i32,
     /// Jobs that may wait for a thread.
     pub(super) waiting_max: usize,
     /// Jobs that may have given way at once: each keeps its memory, and a thread of the system.
@@ -86,10 +84,10 @@ impl Lane {
     /// # Errors
     /// When the system refuses.
     pub(super) fn start(settings: LaneSettings) -> Result<Self, ServiceError> {
-        let LaneSettings { name, threads, niceness, waiting_max, paused_max } = settings;
+        let LaneSettings { name, threads, waiting_max, paused_max } = settings;
         Ok(Self {
             name,
-            threads: Threads::start(name, threads, niceness)?.into(),
+            threads: Threads::start(name, threads)?.into(),
             queue: FairQueue::new(threads, waiting_max, paused_max),
             waiting_for_locks: Arc::new(Shares::new(waiting_max)),
             jobs_waiting_max: waiting_max,
@@ -276,7 +274,7 @@ mod tests {
     use tokio::task::JoinHandle;
 
     fn settings(waiting_max: usize) -> LaneSettings {
-        LaneSettings { name: "test", threads: 1, niceness: 0, waiting_max, paused_max: 4 }
+        LaneSettings { name: "test", threads: 1, waiting_max, paused_max: 4 }
     }
 
     fn lane(waiting_max: usize) -> Arc<Lane> {
@@ -376,17 +374,6 @@ mod tests {
         gone.abort();
         until(|| lane.in_use().cancelled == 1).await;
         assert_eq!(lane.in_use().running, 0);
-    }
-
-    #[cfg(target_os = "linux")]
-    #[tokio::test]
-    async fn threads_are_as_nice_as_they_are_told() {
-        let niceness = |_: StopSignal<'_>| rustix::process::getpriority_process(None).unwrap();
-        let of = async |niceness_of: i32| {
-            let settings = LaneSettings { niceness: niceness_of, ..settings(1) };
-            Lane::start(settings).unwrap().run(&who(), niceness).await.unwrap()
-        };
-        assert_eq!(of(7).await, (of(0).await + 7).min(19));
     }
 
     #[tokio::test]

@@ -10,8 +10,6 @@ const LONG_SHARE: usize = 4;
 /// Threads of the lanes where each job takes memory as a part of a map or of a journal does: one at a time.
 const ONE_AT_A_TIME: usize = 1;
 
-/// How nice threads are that give way to those of other lanes: they get a tenth of a core that both want.
-const NICENESS: i32 = 10;
 /// Jobs of a lane that gave way at once.
 const PAUSED_MAX: usize = 16;
 /// The same where each takes memory as a part of a map or of a journal does.
@@ -35,8 +33,8 @@ pub(crate) struct Lanes {
     pub(crate) messages: Lane,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     pub(crate) mapping: Lane,
-    /// For scans that take long, a second and more each, of robots and keys whose long scans keep failing: while robots
-    /// whose scans fit map on, it hardly runs. A scan that takes long now and then stays in `mapping`, and gives way
+    /// For scans that take long, a second and more each, of robots and keys whose long scans keep failing: robots whose
+    /// scans fit do not wait for them. A scan that takes long now and then stays in `mapping`, and gives way
     /// there.
     pub(crate) long_mapping: Lane,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
@@ -67,9 +65,11 @@ impl Lanes {
     /// When the system refuses.
     pub(crate) fn start(settings: &ServiceSettings) -> Result<Self, ServiceError> {
         let waiting = settings.limits.jobs_waiting_max;
-        let of = |name, threads: usize, niceness, waiting_max, paused_max| {
+        // All of one priority: a nice thread that holds a lock of a map hardly runs, and keeps all others waiting for
+        // it.
+        let of = |name, threads: usize, waiting_max, paused_max| {
             let threads = if threads == 0 { cores() } else { threads };
-            Lane::start(LaneSettings { name, threads, niceness, waiting_max, paused_max })
+            Lane::start(LaneSettings { name, threads, waiting_max, paused_max })
         };
         let half = |threads: usize| (if threads == 0 { cores() } else { threads } / 2).max(1);
         let ServiceSettings { query_threads, mapping_threads, localization_threads, .. } = *settings;
@@ -83,20 +83,20 @@ impl Lanes {
         let long_waiting = waiting.div_ceil(LONG_SHARE);
         let watches = waiting.max(settings.limits.watches_max);
         Ok(Self {
-            reads: of("read", query_threads, 0, waiting, PAUSED_MAX)?,
-            queries: of("query", query_threads, 0, waiting, PAUSED_MAX)?,
-            messages: of("message", query_threads, 0, MESSAGES_WAITING_MAX, 0)?,
-            mapping: of("mapping", mapping_threads, 0, waiting, PAUSED_MAX)?.taking(&robots),
-            long_mapping: of("long_mapping", of_mapping, NICENESS, long_waiting, PAUSED_MAX)?.taking(&robots),
-            alignment: of("alignment", settings.alignment_threads, 0, waiting, PAUSED_MAX)?,
-            localization: of("localization", localization_threads, 0, waiting, LARGE_PAUSED_MAX)?,
-            recovery: of("recovery", of_searches, NICENESS, long_waiting, LARGE_PAUSED_MAX)?,
-            undo: of("undo", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
-            map_files: of("map_file", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
-            watch: of("watch", ONE_AT_A_TIME, 0, watches, LARGE_PAUSED_MAX)?,
-            observers: of("observers", ONE_AT_A_TIME, 0, waiting, LARGE_PAUSED_MAX)?,
-            blocks: of("blocks", of_queries, NICENESS, waiting, LARGE_PAUSED_MAX)?,
-            planning: of("planning", query_threads, 0, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
+            reads: of("read", query_threads, waiting, PAUSED_MAX)?,
+            queries: of("query", query_threads, waiting, PAUSED_MAX)?,
+            messages: of("message", query_threads, MESSAGES_WAITING_MAX, 0)?,
+            mapping: of("mapping", mapping_threads, waiting, PAUSED_MAX)?.taking(&robots),
+            long_mapping: of("long_mapping", of_mapping, long_waiting, PAUSED_MAX)?.taking(&robots),
+            alignment: of("alignment", settings.alignment_threads, waiting, PAUSED_MAX)?,
+            localization: of("localization", localization_threads, waiting, LARGE_PAUSED_MAX)?,
+            recovery: of("recovery", of_searches, long_waiting, LARGE_PAUSED_MAX)?,
+            undo: of("undo", ONE_AT_A_TIME, waiting, LARGE_PAUSED_MAX)?,
+            map_files: of("map_file", ONE_AT_A_TIME, waiting, LARGE_PAUSED_MAX)?,
+            watch: of("watch", ONE_AT_A_TIME, watches, LARGE_PAUSED_MAX)?,
+            observers: of("observers", ONE_AT_A_TIME, waiting, LARGE_PAUSED_MAX)?,
+            blocks: of("blocks", of_queries, waiting, LARGE_PAUSED_MAX)?,
+            planning: of("planning", query_threads, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
         })
     }
 
