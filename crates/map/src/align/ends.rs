@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::fit::Fit;
 use super::look::Look;
-use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
+use super::prior::{DEVIATIONS_MAX, PosePrior, WIDE_DEG, WIDE_M};
 use super::settings::AlignmentSettings;
 use super::verdict::Verdict;
 use super::witnesses::Witnesses;
@@ -35,10 +35,6 @@ const REACH_M: f64 = 3.0 * WIDE_M;
 /// witnesses contradict each other.
 const CONTRADICTED_MIN: f64 = 0.005;
 const UNUSUAL: f64 = 2.0;
-/// Standard deviations from the guess beyond which what is known beforehand is known to be wrong, as where wheels
-/// slipped or the robot was carried: it then tells no pose from another. One pose in a thousand lies farther by chance:
-/// the square root of the 99.9 % quantile of chi squared with six degrees of freedom.
-const DEVIATIONS_MAX: f64 = 4.7;
 /// A pose of another place is a rival whose cost is at most this much more than the best: three standard deviations.
 pub(super) const RIVAL: f64 = 9.0;
 

@@ -1,5 +1,6 @@
 //! Settings of the alignment.
 
+use super::prior::DEVIATIONS_MAX;
 use crate::map::Lookup;
 use crate::util::Keyword;
 
@@ -138,7 +139,7 @@ impl Default for AlignmentSettings {
             slide: 5.0,
             slide_overlap_max: 0.85,
             gravity_error_max_deg: 5.0,
-            covariance_deviations_max: 4.7,
+            covariance_deviations_max: DEVIATIONS_MAX,
             lookup: Lookup::Bloom,
         }
     }

@@ -28,7 +28,7 @@ pub enum Decision {
 
 impl ScanMapper<'_> {
     /// Decides what becomes of a scan that was [located](Self::locate) and, if its robot was lost, [looked
-    /// for](Self::recover). Changes nothing in the map; the robot was seen at the pose, if that is accepted.
+    /// for](Self::recover). Changes nothing in the map; notes where the scan was found and whether it fits.
     ///
     /// # Errors
     /// No point lies within the map's range, or `stop` said so.

@@ -40,9 +40,9 @@ impl Asleep {
     /// Reads its files, which [`Asleep::is_opened_for`] tells of meanwhile.
     pub(super) fn open<T>(&self, open: impl FnOnce() -> T) -> T {
         *self.opening_since.lock() = Some(Instant::now());
-        let opened = open();
-        *self.opening_since.lock() = None;
-        opened
+        // Where it panics, the next request tries again.
+        let _opening = Opening(self);
+        open()
     }
 
     /// True of a map whose files are being read for so long and more.
@@ -55,5 +55,30 @@ impl Asleep {
     pub(super) fn wait(&self, asker: &Asker, places_of_all: usize) -> Option<Share> {
         let places = || Arc::new(Shares::new((places_of_all / 2).max(1)));
         self.waiting.get_or_init(places).take(asker)
+    }
+}
+
+/// Until it is dropped, a map's files are being read.
+struct Opening<'a>(&'a Asleep);
+
+impl Drop for Opening<'_> {
+    fn drop(&mut self) {
+        *self.0.opening_since.lock() = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_whose_opening_panicked_is_not_being_opened() {
+        let asleep = Asleep::default();
+        let during = asleep.open(|| asleep.is_opened_for(Duration::ZERO));
+        assert!(during && !asleep.is_opened_for(Duration::ZERO));
+        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            asleep.open(|| panic!("a file that no test has"));
+        }));
+        assert!(panicked.is_err() && !asleep.is_opened_for(Duration::ZERO));
     }
 }

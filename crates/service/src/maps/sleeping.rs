@@ -43,7 +43,7 @@ impl Catalog {
     /// A disk that hangs under a map keeps nobody waiting for ever, and no other map from being opened: after
     /// [`PLACE_MAX`] its place goes to another. Nor do those who wait for it keep requests for other maps out: they are
     /// a share of all requests, half of it for one map; of both, one asker has as many as places are left. Once its
-    /// opening has taken longer than that, nobody waits for it any more.
+    /// opening has taken [`PLACE_MAX`], further requests are refused at once.
     pub(crate) async fn get(
         self: &Arc<Self>,
         name: &Reachable,
@@ -57,7 +57,7 @@ impl Catalog {
                 Place::Asleep(asleep) => asleep,
             };
             if asleep.is_opened_for(PLACE_MAX) {
-                return Err(still_opening(name.name()));
+                return Err(still_opening(name.name(), PLACE_MAX));
             }
             if waiting.is_none() {
                 let of_map = asleep.wait(asker, self.waiting.most());
@@ -66,7 +66,7 @@ impl Catalog {
             }
             // A request that waits holds no thread.
             let opened = timeout(OPENING_MAX, Arc::clone(self).open_for_request(name.name().clone(), asleep));
-            opened.await.unwrap_or_else(|_| Err(still_opening(name.name())))?;
+            opened.await.unwrap_or_else(|_| Err(still_opening(name.name(), OPENING_MAX)))?;
         }
     }
 
@@ -209,9 +209,9 @@ fn too_many_wait(name: &MapName) -> ServiceError {
 }
 
 /// A map whose opening takes longer than anybody waits for.
-fn still_opening(name: &MapName) -> ServiceError {
+fn still_opening(name: &MapName, waited: Duration) -> ServiceError {
     let message = format!(
-        "map {name} has been opened for {PLACE_MAX:?} and more: it is large, or its disk hangs; try again"
+        "map {name} is not open after {waited:?}: it is large, its disk hangs, or others are opened first; try again"
     );
     ServiceError::new(Reason::CatalogBusy, message).retry_after(OPENING_MAX)
 }

@@ -166,10 +166,10 @@ mod tests {
         assert!(send("honest", wall(2.0).collect(), true).await);
         let begun = |name: &str| service.lanes().into_iter().find(|lane| lane.name == name).unwrap().begun;
         // What fits nowhere near needs more starts.
-        for (failures, nice) in [(0, 0), (1, 0), (2, 0), (3, 1), (4, 2)] {
+        for (failures, apart) in [(0, 0), (1, 0), (2, 0), (3, 1), (4, 2)] {
             let before = begun("mapping");
             assert!(!send("garbage", wall(-7.0).collect(), false).await, "after {failures}");
-            assert_eq!((begun("mapping") - before, begun("long_mapping")), (2 - u64::from(nice > 0), nice));
+            assert_eq!((begun("mapping") - before, begun("long_mapping")), (2 - u64::from(apart > 0), apart));
         }
     }
 }

@@ -72,11 +72,12 @@ impl HostedMap {
         let recovered = mapper.recover(&scan.to_map(), located, stop);
         check_not_stopped(stop)?;
         let recovered = recovered?;
-        if recovered.is_accepted() || request.at_guess || request.force {
+        let is_found = recovered.is_accepted() || request.at_guess || request.force;
+        let decision = mapper.decide(&scan.to_map(), recovered, stop);
+        if is_found {
             // Where nobody asks for it any more, too.
             self.robots.lost.found(&request.robot);
         }
-        let decision = mapper.decide(&scan.to_map(), recovered, stop);
         check_not_stopped(stop)?;
         let decision = decision?;
         let (located, scan_record, carved_at) = match decision {
