@@ -129,10 +129,6 @@ const FOUND_DEG: f64 = 1.0;
 /// Standard deviations of a guess of which nothing else is known: meters and degrees.
 pub(super) const WIDE_M: f64 = 2.0;
 pub(super) const WIDE_DEG: f64 = 40.0;
-/// Standard deviations from the guess beyond which what is known beforehand is known to be wrong, as where wheels
-/// slipped or the robot was carried: it then tells no pose from another. One pose in a thousand lies farther by chance:
-/// the square root of the 99.9 % quantile of chi squared with six degrees of freedom.
-pub(super) const DEVIATIONS_MAX: f64 = 4.7;
 /// Three standard deviations of a yaw that may be another one altogether, degrees.
 const YAW_OPEN_DEG: f64 = 30.0;
 /// Standard deviation of a turn of which nothing is known, radians: no turn is farther than one of them.

@@ -1,8 +1,12 @@
 //! Settings of the alignment.
 
-use super::prior::DEVIATIONS_MAX;
 use crate::map::Lookup;
 use crate::util::Keyword;
+
+/// Standard deviations from the guess beyond which what is known beforehand is known to be wrong, as where wheels
+/// slipped or the robot was carried: it then tells no pose from another. One pose in a thousand lies farther by chance:
+/// the square root of the 99.9 % quantile of chi squared with six degrees of freedom.
+pub(super) const DEVIATIONS_MAX: f64 = 4.7;
 
 /// How a scan is aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
