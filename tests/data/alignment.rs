@@ -4,7 +4,7 @@
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose, pose, pose_difference};
 use mrol::map::{MapName, MapSettings, MultiResolutionMap, RobotName};
-use mrol::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
+use mrol::mapping::{Guess, MappingSettings, Scan, ScanMapper, Sightings};
 use mrol::service::ScanRequest;
 use mrol::util::StopSignal;
 use serde_json::{Value, json};
@@ -89,4 +89,26 @@ async fn scans_meters_apart_align_to_the_truth_and_alike_on_every_way_in() {
         }
     }
     daemon.stop().await;
+}
+
+/// A wall of the office resembles another one, where rays contradict a twentieth of the scan and nothing of the map.
+/// But at the right pose all agrees, so nothing came or went, and the other pose is no rival.
+#[test]
+fn where_all_agrees_no_pose_is_as_likely_that_needs_a_change() {
+    let Some(set) = shared_scans::open("icl_office_kt0") else { return };
+    let map = MultiResolutionMap::new(MapSettings::new(0.04, LEVELS)).unwrap();
+    let (robot, sightings) = (robot(), Sightings::default());
+    let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+    let put = |k: usize| {
+        let points = set.points(k);
+        let guess = Guess::Pose(set.map_from_sensor[k]);
+        let scan = Scan { guess, at_guess: true, ..Scan::new(&robot, &points) };
+        mapper.map_scan(&scan, StopSignal::NEVER).unwrap();
+    };
+    (0..142).for_each(put);
+    let points = set.points(142);
+    let located = mapper.map_scan(&Scan::new(&robot, &points), StopSignal::NEVER).unwrap().located;
+    assert!(located.is_accepted(), "{}", located.alignment.reason);
+    let (meters, _) = pose_difference(&set.map_from_sensor[142], &located.alignment.map_from_sensor);
+    assert!(meters < 0.02, "{meters} m off");
 }

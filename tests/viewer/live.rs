@@ -4,6 +4,7 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::{Daemon, identity_json, json_of, pose_json};
+use crate::support::map_folders::copy_folder;
 use crate::{DRAWN, assert_clean, before_wall, link, middle_color, shown, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -29,6 +30,40 @@ async fn a_map_grows_in_the_picture_and_a_lost_connection_is_said_and_resumed() 
     daemon.put_in("a", &[[0.05, 0.55, 0.05], [0.05, 0.65, 0.05]]).await;
     browser.wait("document.getElementById('connection').dataset.state === 'live'").await;
     browser.wait(&format!("{DRAWN} && scene.drawn.voxels === 443")).await;
+    assert_clean(&browser.told(), &daemon);
+}
+
+/// An older data folder is put back, and what happens to it then leaves the voxels and the revision that the page
+/// knows: the hash of the whole state alone tells that the keep-out is another one.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_restored_map_holds_is_shown_where_its_voxels_are_the_same() {
+    let _turn = turn().await;
+    let Some(browser) = Browser::start().await else { return };
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &wall()).await;
+    let (http, data) = (daemon.http, daemon.stop().await);
+    let cold = tempfile::tempdir().unwrap();
+    copy_folder(data.path(), cold.path());
+    let region = json!({"box": {"min_m": [-0.5, -1, -0.5], "max_m": [0.5, -0.5, 0.5]}});
+
+    let daemon = Daemon::start_in(data, |config| config.http.listen = http).await;
+    browser.open(&link(&daemon, "a")).await;
+    browser.wait("document.getElementById('connection').dataset.state === 'live'").await;
+    assert!(daemon.put("/v1/maps/a/keep-outs/left", region.clone()).await.status().is_success());
+    browser.wait("document.getElementById('keep-outs').textContent.includes('left')").await;
+    let (revision, _) = daemon.contents("a").await;
+    daemon.stop().await;
+    browser.wait("document.getElementById('connection').dataset.state === 'lost'").await;
+
+    // On another port, so that the page comes back when the other keep-out is already there.
+    let daemon = Daemon::start_in(cold, |_| ()).await;
+    assert!(daemon.put("/v1/maps/a/keep-outs/right", region).await.status().is_success());
+    assert_eq!(daemon.contents("a").await.0, revision);
+    let cold = daemon.stop().await;
+    let daemon = Daemon::start_in(cold, |config| config.http.listen = http).await;
+    browser.wait("document.getElementById('keep-outs').textContent.includes('right')").await;
+    assert!(!text(&browser, "#keep-outs").await.contains("left"));
     assert_clean(&browser.told(), &daemon);
 }
 

@@ -1,5 +1,5 @@
-//! A robot that a lift took up unseen is not believed below; and true odometry is not overruled by far where rays
-//! cannot tell.
+//! A robot that was carried to where a scan fits as well is not believed there: to another floor, or this side of a
+//! thin wall. And true odometry is not overruled by far where rays cannot tell.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
@@ -21,8 +21,8 @@ struct Mapped {
 }
 
 impl Mapped {
-    fn new() -> Self {
-        let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, 5)).unwrap();
+    fn new(resolution_m: f64) -> Self {
+        let map = MultiResolutionMap::new(MapSettings::new(resolution_m, 5)).unwrap();
         Self { map, sightings: Sightings::default(), robot: RobotName::new("r").unwrap() }
     }
 
@@ -86,7 +86,7 @@ fn along_a_bare_corridor_no_pose_is_believed_that_odometry_rules_out() {
     for seed in 0..10 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let width_m = random.random_range(1.8..3.0);
-        let mapped = Mapped::new();
+        let mapped = Mapped::new(RESOLUTION_M);
         let along = |x: f64, random: &mut ChaCha8Rng| {
             let mut small = || random.random_range(-0.015..0.015);
             Pose::from_parts(
@@ -115,7 +115,7 @@ fn a_robot_that_a_lift_took_up_unseen_is_not_believed_below() {
         SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
     for seed in 0..8 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mapped = Mapped::new();
+        let mapped = Mapped::new(RESOLUTION_M);
         let floors = [0, 1].map(|floor| Scene::rectangular_room(500 + 2 * seed + floor, [9.0, 7.0], 3));
         let heights = [Pose::identity(), Pose::translation(0.0, 0.0, 3.2)];
         for (scene, map_from_room) in floors.iter().zip(&heights).rev() {
@@ -132,6 +132,65 @@ fn a_robot_that_a_lift_took_up_unseen_is_not_believed_below() {
     }
 }
 
+/// The floors have the same walls and half of the furniture: what differs contradicts one side of a scan, if that.
+#[test]
+fn a_robot_is_not_believed_on_the_floor_that_it_left_where_furniture_alone_tells_them_apart() {
+    let lidar =
+        SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
+    for seed in 0..8 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mapped = Mapped::new(RESOLUTION_M);
+        let floors = [0, 3].map(|moved| Scene::rearranged_room(700 + seed, [9.0, 7.0], 6, moved));
+        let heights = [Pose::identity(), Pose::translation(0.0, 0.0, 3.0)];
+        let mut last = Pose::identity();
+        for (scene, map_from_room) in floors.iter().zip(&heights).rev() {
+            for k in 0..4 {
+                let room_from_sensor =
+                    at(0.5 * f64::from(k) - 0.6, 0.3 * f64::from(k % 2), 0.8, 0.7 * f64::from(k));
+                let points = finite(lidar.scan(scene, &room_from_sensor, &mut random));
+                last = room_from_sensor;
+                mapped.add(&points, map_from_room * room_from_sensor);
+            }
+        }
+        let points = finite(lidar.scan(&floors[1], &last, &mut random));
+        for guess in [Guess::Last, Guess::Motion(at(0.05, 0.0, 0.0, 0.02))] {
+            mapped.assert_not_misled(&points, guess, &(heights[1] * last), 2.0 * RESOLUTION_M);
+        }
+    }
+}
+
+/// A wall of 12 cm has two faces: that which the next room shows is not that which this one showed.
+#[test]
+fn a_room_behind_a_thin_wall_is_not_moved_by_the_thickness_of_the_wall() {
+    const RESOLUTION_M: f64 = 0.05;
+    let lidar =
+        SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
+    for seed in 0..8 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mapped = Mapped::new(RESOLUTION_M);
+        let building = Scene::furnished(seed);
+        let placed = |x_m: f64, random: &mut ChaCha8Rng| {
+            loop {
+                let mut somewhere = |half: f64| random.random_range(-half..half);
+                let place = at(x_m + somewhere(2.0), 7.2 + somewhere(1.0), 0.8, somewhere(3.0));
+                let points = finite(lidar.scan(&building, &place, random));
+                // Not in the middle of a cupboard.
+                if points.len() > 5000 {
+                    return (points, place);
+                }
+            }
+        };
+        for _ in 0..6 {
+            let (points, place) = placed(3.0, &mut random);
+            mapped.add(&points, place);
+        }
+        let (points, truth) = placed(9.5, &mut random);
+        let mut somewhere = |half: f64| random.random_range(-half..half);
+        let guess = truth * at(somewhere(0.02), somewhere(0.02), 0.0, somewhere(0.01));
+        mapped.assert_not_misled(&points, Guess::Pose(guess), &truth, 1.8 * RESOLUTION_M);
+    }
+}
+
 /// Wheels that say nothing of a turn are wrong, and then speak for no pose that is turned otherwise either.
 #[test]
 fn a_robot_that_was_turned_in_place_against_its_odometry_is_not_believed_elsewhere() {
@@ -139,7 +198,7 @@ fn a_robot_that_was_turned_in_place_against_its_odometry_is_not_believed_elsewhe
         SpinningLidar { rings: 16, azimuths: 720, elevation_max_deg: 20.0, ..SpinningLidar::default() };
     for seed in 0..24 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mapped = Mapped::new();
+        let mapped = Mapped::new(RESOLUTION_M);
         let pieces = 2 + seed as usize % 2;
         let room = Scene::rectangular_room(900 + seed, [9.0, 6.0], pieces);
         let mut last = Pose::identity();

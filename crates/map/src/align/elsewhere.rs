@@ -10,6 +10,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::agreement::spread;
 use super::ascent::{Ascent, Steps};
+use super::ends::EVIDENCE_MIN;
 use super::overlap::Overlap;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
@@ -29,6 +30,8 @@ pub(super) const LEVEL_OF_SHIFTS: u32 = 1;
 const AS_GOOD: f64 = 0.8;
 /// The same before its ascent with few points, where it lies up to half a step aside.
 const AS_GOOD_ASIDE: f64 = 0.6;
+/// Floors lie at least so far above each other, meters.
+const STOREY_MIN_M: f64 = 2.0;
 /// Shifted poses that are ascended from with few points, at most, and poses that are found to be as good.
 const SHIFTED: usize = 16;
 const FOUND: usize = 8;
@@ -63,7 +66,9 @@ pub(super) fn turned(
     };
     let at_guess = few.is_elsewhere(pose, &Pose::from_parts(guess.translation, pose.rotation));
     let at_guess = at_guess.then(|| about(guess.translation)).into_iter().flatten();
-    few.as_good(pose, about(pose.translation).skip(1).chain(at_guess).collect(), map.settings().levels - 1)
+    let least = AS_GOOD * few.overlap(few.level).at(&[*pose], few.stop)[0] as f64;
+    let guesses = about(pose.translation).skip(1).chain(at_guess).collect();
+    few.as_good(pose, guesses, map.settings().levels - 1, least)
 }
 
 /// Where a scan that was found at `pose` may fit as well, shifted along `axes` (of length 1, map frame) by up to
@@ -77,31 +82,31 @@ pub(super) fn shifted(
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_SHIFTS, settings);
-    let step_m = map.lattice().resolution_m(few.level);
-    let overlap = few.overlap(few.level);
-    let least = AS_GOOD_ASIDE * overlap.at(&[*pose], few.stop)[0] as f64;
-    let mut peaks: Vec<Pose> = Vec::new();
-    for &axis in axes {
-        let steps = (possible_m(axis) / step_m).floor().clamp(0.0, STEPS_MAX) as i32;
-        let at = |step: i32| {
-            let way = axis * (f64::from(step) * step_m);
-            Pose::from_parts(Translation3::from(way) * pose.translation, pose.rotation)
-        };
-        let poses: Vec<Pose> = (-steps..=steps).map(at).collect();
-        let heights = overlap.at(&poses, few.stop);
-        let is_peak = |i: usize| {
-            let beside = |j: usize| heights.get(j).copied().unwrap_or(0);
-            let before = if i == 0 { 0 } else { beside(i - 1) };
-            heights[i] as f64 >= least && heights[i] >= before && heights[i] >= beside(i + 1)
-        };
-        peaks.extend((0..poses.len()).filter(|&i| is_peak(i)).map(|i| poses[i]));
-    }
-    // A peak is seen up to half a step aside.
-    peaks.retain(|peak| pose_difference(peak, pose).0 > 1.5 * step_m);
+    let overlap = few.overlap(few.level).at(&[*pose], few.stop)[0] as f64;
+    let axes = axes.iter().map(|&axis| (axis, possible_m(axis)));
+    let mut peaks = few.peaks(pose, axes, AS_GOOD_ASIDE * overlap);
     // Where things repeat, the next place is the hardest to tell.
     peaks.sort_by(|a, b| pose_difference(a, pose).0.total_cmp(&pose_difference(b, pose).0));
     peaks.truncate(SHIFTED);
-    few.as_good(pose, peaks, few.level)
+    few.as_good(pose, peaks, few.level, AS_GOOD * overlap)
+}
+
+/// Where a scan that was found at `pose`, and is contradicted there, may have been taken on another floor, up to
+/// `possible_m` above or below. That may be mapped less than this one: it need not fit as well, but as well as rays
+/// have to tell anything of it.
+pub(super) fn on_other_floors(
+    map: &MultiResolutionMap,
+    scan: &SampledScan<'_>,
+    pose: &Pose,
+    possible_m: f64,
+    settings: &AlignmentSettings,
+) -> Vec<Pose> {
+    let few = Few::of(map, scan, LEVEL_OF_SHIFTS, settings);
+    let least = EVIDENCE_MIN * few.points.len() as f64;
+    let mut peaks = few.peaks(pose, [(Vector3::z(), possible_m)], least);
+    let above_m = |peak: &Pose| (peak.translation.vector - pose.translation.vector).norm();
+    peaks.retain(|peak| above_m(peak) >= STOREY_MIN_M);
+    few.as_good(pose, peaks, few.level, least)
 }
 
 impl<'a> Few<'a> {
@@ -119,9 +124,40 @@ impl<'a> Few<'a> {
         Overlap::new(self.map, &self.points, level, self.settings.lookup)
     }
 
-    /// The ends of ascents from `guesses`, from the level `coarsest` on, that are as good as `pose`, each elsewhere
-    /// than that and the others.
-    fn as_good(&self, pose: &Pose, guesses: Vec<Pose>, coarsest: u32) -> Vec<Pose> {
+    /// Places at which `least` points and more fall in occupied voxels, and more than beside them, shifted from `pose`
+    /// along axes by up to so many meters, either way.
+    fn peaks(
+        &self,
+        pose: &Pose,
+        axes: impl IntoIterator<Item = (Vector3<f64>, f64)>,
+        least: f64,
+    ) -> Vec<Pose> {
+        let step_m = self.map.lattice().resolution_m(self.level);
+        let overlap = self.overlap(self.level);
+        let mut peaks: Vec<Pose> = Vec::new();
+        for (axis, possible_m) in axes {
+            let steps = (possible_m / step_m).floor().clamp(0.0, STEPS_MAX) as i32;
+            let at = |step: i32| {
+                let way = axis * (f64::from(step) * step_m);
+                Pose::from_parts(Translation3::from(way) * pose.translation, pose.rotation)
+            };
+            let poses: Vec<Pose> = (-steps..=steps).map(at).collect();
+            let heights = overlap.at(&poses, self.stop);
+            let is_peak = |i: usize| {
+                let beside = |j: usize| heights.get(j).copied().unwrap_or(0);
+                let before = if i == 0 { 0 } else { beside(i - 1) };
+                heights[i] as f64 >= least && heights[i] >= before && heights[i] >= beside(i + 1)
+            };
+            peaks.extend((0..poses.len()).filter(|&i| is_peak(i)).map(|i| poses[i]));
+        }
+        // A peak is seen up to half a step aside.
+        peaks.retain(|peak| pose_difference(peak, pose).0 > 1.5 * step_m);
+        peaks
+    }
+
+    /// The ends of ascents from `guesses`, from the level `coarsest` on, with `least` points and more in occupied
+    /// voxels, each elsewhere than `pose` and the others.
+    fn as_good(&self, pose: &Pose, guesses: Vec<Pose>, coarsest: u32, least: f64) -> Vec<Pose> {
         let climbed = guesses.into_iter().map(|guess| {
             let mut ascent = Ascent::from(guess);
             for level in (self.level..=coarsest).rev() {
@@ -130,10 +166,9 @@ impl<'a> Few<'a> {
             }
             ascent.pose
         });
-        let poses: Vec<Pose> = std::iter::once(*pose).chain(climbed).collect();
+        let poses: Vec<Pose> = climbed.collect();
         let heights = self.overlap(self.level).at(&poses, self.stop);
-        let least = AS_GOOD * heights[0] as f64;
-        let mut ranked: Vec<_> = heights[1..].iter().zip(&poses[1..]).collect();
+        let mut ranked: Vec<_> = heights.iter().zip(&poses).collect();
         ranked.sort_by_key(|(height, _)| Reverse(**height));
         let mut as_good: Vec<Pose> = Vec::new();
         for (height, end) in ranked {

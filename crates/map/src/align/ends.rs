@@ -8,10 +8,12 @@ use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::fit::Fit;
 use super::look::Look;
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
+use super::sampled_scan::SampledScan;
 use super::settings::{AlignmentSettings, DEVIATIONS_MAX};
+use super::sides;
 use super::verdict::Verdict;
 use super::witnesses::Witnesses;
-use crate::geometry::{Pose, pose_difference};
+use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 
@@ -20,7 +22,7 @@ const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
 /// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
 /// nothing of each other cannot be compared.
-const EVIDENCE_MIN: f64 = 0.2;
+pub(super) const EVIDENCE_MIN: f64 = 0.2;
 const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
 /// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
@@ -30,7 +32,7 @@ const AGREEMENT_MIN: f64 = 0.9;
 /// does not count: the robot may have been turned unseen.
 const NEAR_M: f64 = 0.75 * WIDE_M;
 const NEAR_TILT_DEG: f64 = WIDE_DEG;
-const REACH_M: f64 = 3.0 * WIDE_M;
+pub(super) const REACH_M: f64 = 3.0 * WIDE_M;
 /// Both sides are contradicted where more than this share of each is, and more than [`UNUSUAL`] times what the
 /// witnesses contradict each other.
 const CONTRADICTED_MIN: f64 = 0.005;
@@ -143,6 +145,28 @@ impl<'a> Ends<'a> {
         self.all = ends.into_iter().map(|end| self.end(end.fit)).collect();
     }
 
+    /// The surface points of the scan that earlier scans met from its side where the best end puts them, see [`sides`];
+    /// none where all are.
+    pub(super) fn met_from_own_side(
+        &self,
+        map: &MultiResolutionMap,
+        scan: &SampledScan<'_>,
+    ) -> Option<Vec<Point>> {
+        let End { fit, against, .. } = self.best();
+        let is_judged = against.is_none() && !self.stop.is_stopped();
+        let of = |pose| sides::met_from_own_side(map, scan, pose, self.rays, &self.witnesses);
+        if is_judged { of(&fit.map_from_sensor) } else { None }
+    }
+
+    /// Puts another fit in the place of the best end.
+    pub(super) fn replace_best(&mut self, fit: Fit) {
+        self.lookups += fit.lookups;
+        let pose = self.best().fit.map_from_sensor;
+        if let Some(best) = self.all.iter().position(|end| end.fit.map_from_sensor == pose) {
+            self.all[best] = self.end(fit);
+        }
+    }
+
     /// Leaves open which way the robot was turned.
     pub(super) fn open_yaw(&mut self) {
         self.prior = self.prior.map(PosePrior::with_open_yaw);
@@ -239,8 +263,10 @@ impl<'a> Ends<'a> {
         let is_nearer = end.deviations < best.deviations
             && end.against.is_none()
             && (self.is_usual(end) || !self.is_usual(best));
-        // A single thing that came or went may be all that speaks against it, unless that is much.
+        // A single thing that came or went may be all that speaks against it, unless that is much. Where the scan and
+        // earlier scans agree at the best end in all, nothing came or went.
         let is_contradicted_one_way = end.agreement.worse() >= AGREEMENT_MIN
+            && best.agreement.worse() < 1.0 - CONTRADICTED_MIN
             && end.is_as_near_as(best)
             && !end.is_contradicted_both_ways_more_than(best);
         is_as_likely || is_preferred_by_rays || is_nearer || is_contradicted_one_way
@@ -254,6 +280,13 @@ impl<'a> Ends<'a> {
         let both = of_scan.contradicted_share().min(of_map.contradicted_share());
         end.against.is_none()
             && (both <= CONTRADICTED_MIN || both <= UNUSUAL * self.contradicted_among_witnesses())
+    }
+
+    /// True of an end that rays contradict on either side more than the witnesses contradict each other: people do,
+    /// what was moved, and another floor of which one side only shows what differs.
+    pub(super) fn is_contradicted(&self, end: &End) -> bool {
+        let most = 1.0 - end.agreement.worse();
+        most > CONTRADICTED_MIN && most > UNUSUAL * self.contradicted_among_witnesses()
     }
 
     /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard

@@ -16,6 +16,7 @@
 //! marched                               what earlier scans must have seen, where they left no viewpoints
 //! rivals, ends    Contest, Ends         which of several ends to believe, by rays and by what is known beforehand
 //! elsewhere                             where else the scan may fit as well
+//! sides                                 which surfaces earlier scans met from the other side
 //! multi_start                           further guesses, where the first ends badly
 //! localize                              no guess at all
 //! ```
@@ -44,6 +45,7 @@ mod rivals;
 mod sampled_scan;
 mod sequential;
 mod settings;
+mod sides;
 mod slide;
 mod stages;
 #[cfg(test)]

@@ -8,8 +8,9 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
-use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, shifted, turned};
-use super::ends::{End, Ends, RIVAL, cost_of_prior};
+use super::ascent::Ascent;
+use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, on_other_floors, shifted, turned};
+use super::ends::{End, Ends, REACH_M, RIVAL, cost_of_prior};
 use super::fit::Fit;
 use super::prior::PosePrior;
 use super::sampled_scan::SampledScan;
@@ -42,13 +43,14 @@ impl Contest<'_> {
         let best = ends.best();
         let is_doubted = self.is_doubted(best, &ends);
         if best.against.is_some() && !is_doubted {
-            return self.judged(&ends);
+            return self.judged(&mut ends);
         }
         // Whoever was turned away unseen may stand at any yaw, and where things repeat the scan fits at each of them.
         let may_have_turned = is_doubted || prior.leaves_yaw_open() || best.is_beyond_odometry();
-        let others = self.others(&best.fit, prior, is_doubted, may_have_turned);
+        let may_have_changed_floors = is_doubted || ends.is_contradicted(best);
+        let others = self.others(&best.fit, prior, may_have_changed_floors, may_have_turned);
         if others.is_empty() || self.settings.multi_start.ascents == 0 {
-            return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&ends) };
+            return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&mut ends) };
         }
         // What odometry tells of the turn is heard where rays contradict both sides, too.
         if prior.leaves_yaw_open() {
@@ -59,7 +61,7 @@ impl Contest<'_> {
             ends.add(finish(self.map, self.scan, ascent, self.settings));
         }
         ends.hear_further_witnesses(self.map);
-        self.judged(&ends)
+        self.judged(&mut ends)
     }
 
     /// Places that a search found, looked at by rays and [ranked](Ends::rank): nothing is known beforehand. Of those
@@ -71,7 +73,7 @@ impl Contest<'_> {
     }
 
     /// Which of the places that a search found is the best, with a verdict. They must not be none.
-    pub(super) fn decide_among(&self, places: &Ends<'_>) -> Alignment {
+    pub(super) fn decide_among(&self, places: &mut Ends<'_>) -> Alignment {
         self.judged(places)
     }
 
@@ -80,27 +82,29 @@ impl Contest<'_> {
     }
 
     /// Where else the scan may fit as well, with the coarsest level to ascend on from there: shifted as far as the
-    /// prior reaches around its guess, along the map's axes and those of what holds the pose, and turned. Where the
-    /// pose is doubted, on other floors too: the robot may have taken a lift.
+    /// prior reaches around its guess, along the map's axes and those of what holds the pose, and turned. On other
+    /// floors too, whatever the prior says, where the robot may have taken a lift unseen.
     fn others(
         &self,
         found: &Fit,
         prior: &PosePrior,
-        is_doubted: bool,
+        may_have_changed_floors: bool,
         may_have_turned: bool,
     ) -> Vec<(Pose, u32)> {
         let far_m = REACH_VOXELS * self.map.lattice().resolution_m(0);
         let from_guess = found.map_from_sensor.translation.vector - prior.guess.translation.vector;
-        let possible_m = |axis: Vector3<f64>| {
-            let possible_m = prior.possible_m(axis) + from_guess.dot(&axis).abs();
-            if possible_m > far_m { possible_m } else { 0.0 }
-        };
+        let farthest_m = |axis: Vector3<f64>| prior.possible_m(axis) + from_guess.dot(&axis).abs();
+        let possible_m =
+            |axis| Some(farthest_m(axis)).filter(|farthest_m| *farthest_m > far_m).unwrap_or(0.0);
         let on_floor = [Some(Vector2::x()), least_held(found)].into_iter().flatten();
         let on_floor = on_floor.flat_map(|axis| [axis, Vector2::new(-axis.y, axis.x)]);
-        let axes = on_floor.map(|axis| axis.push(0.0)).chain(is_doubted.then_some(Vector3::z()));
-        let axes: Vec<Vector3<f64>> = axes.collect();
+        let axes: Vec<Vector3<f64>> = on_floor.map(|axis| axis.push(0.0)).collect();
         let pose = &found.map_from_sensor;
-        let shifted = shifted(self.map, self.scan, pose, &axes, possible_m, self.settings);
+        let mut shifted = shifted(self.map, self.scan, pose, &axes, possible_m, self.settings);
+        if may_have_changed_floors {
+            let farthest_m = farthest_m(Vector3::z()).max(REACH_M);
+            shifted.extend(on_other_floors(self.map, self.scan, pose, farthest_m, self.settings));
+        }
         let turned = match may_have_turned {
             true => turned(self.map, self.scan, pose, &prior.guess, self.settings),
             false => Vec::new(),
@@ -117,8 +121,14 @@ impl Contest<'_> {
         is_contradicted || end.against.is_none() && !ends.is_usual(end)
     }
 
-    /// The verdict on the best of the ends.
-    fn judged(&self, ends: &Ends<'_>) -> Alignment {
+    /// The verdict on the best of the ends, refined without the surfaces that are not its own: the other side of a thin
+    /// wall lies where this side would be, or pulls the scan there.
+    fn judged(&self, ends: &mut Ends<'_>) -> Alignment {
+        if let Some(points) = ends.met_from_own_side(self.map, self.scan) {
+            let scan = self.scan.with_surface_sample(points, self.map.lattice());
+            let ascent = Ascent::from(ends.best().fit.map_from_sensor);
+            ends.replace_best(finish(self.map, &scan, ascent, self.settings));
+        }
         let best = ends.best();
         let (verdict, reason, rivals) = self.verdict_on(best, ends);
         Alignment {

@@ -84,7 +84,7 @@ impl Lanes {
         let watches = waiting.max(settings.limits.watches_max);
         Ok(Self {
             reads: of("read", query_threads, waiting, PAUSED_MAX)?,
-            queries: of("query", query_threads, waiting, PAUSED_MAX)?,
+            queries: of("query", query_threads, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
             messages: of("message", query_threads, MESSAGES_WAITING_MAX, 0)?,
             mapping: of("mapping", mapping_threads, waiting, PAUSED_MAX)?.taking(&robots),
             long_mapping: of("long_mapping", of_mapping, long_waiting, PAUSED_MAX)?.taking(&robots),

@@ -1,6 +1,5 @@
 //! `mrol-lab experiment convergence`: measures from how far off a guess an alignment finds the pose.
 
-use mrol_map::util::Keyword;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
@@ -16,8 +15,10 @@ use mrol::console::output::Output;
 use mrol::console::statistics::Statistics;
 use mrol_map::align::{AlignmentSettings, Method, Verdict};
 use mrol_map::geometry::{Pose, rotation_xyzw, translation_m};
-use mrol_map::map::{MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol_map::map::{MultiResolutionMap, RobotName};
+use mrol_map::mapping::{self, Guess, MappingSettings, ScanMapper, Sightings};
 use mrol_map::scan::{read_points, read_trajectory, scan_files};
+use mrol_map::util::{Keyword, StopSignal};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -98,9 +99,12 @@ impl Convergence {
         let settings = self.map.settings(self.resolution)?;
         let map = MultiResolutionMap::new(settings).map_err(CliError::usage)?;
         let robot = RobotName::new("experiment").map_err(CliError::failed)?;
-        let pose = MappedScan::new(robot, Pose::identity());
         let points = Scan::of_finite(read_points(&self.target)?, None).points;
-        map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
+        let sightings = Sightings::default();
+        let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+        let guess = Guess::Pose(Pose::identity());
+        let scan = mapping::Scan { guess, at_guess: true, ..mapping::Scan::new(&robot, &points) };
+        mapper.map_scan(&scan, StopSignal::NEVER).map_err(CliError::failed)?;
         Ok(map)
     }
 

@@ -44,6 +44,9 @@ pub(super) struct Verdicts {
     /// Seed of guesses and places
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Maps of the sets keep no viewpoints, as those from before there were any
+    #[arg(long)]
+    no_viewpoints: bool,
 }
 
 /// Least share of points that agree, of each side, for a pose whose rays tell anything.
@@ -54,7 +57,11 @@ impl Verdicts {
         let settings = AlignmentSettings::default();
         let mut sets = Vec::new();
         for set in &self.sets {
-            sets.push(set.read(self.scans, output)?);
+            let mut set = set.read(self.scans, output)?;
+            if self.no_viewpoints {
+                set.viewpoints.bytes_max = 0;
+            }
+            sets.push(set);
         }
         let steps = sets.len() * MapOf::ALL.len() * (GUESSES.len() + 1)
             + PIECES.len() * PEOPLE.len()

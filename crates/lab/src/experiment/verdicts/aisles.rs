@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::outcomes::Outcomes;
 use super::trial::{SIMULATED_M, aligned, covariance, lidar, mapped, noise, on_floor, seen};
 use mrol_map::align::{AlignmentSettings, PosePrior};
+use mrol_map::mapping::ViewpointSettings;
 use mrol_simulate::Scene;
 
 /// Periods of aisles, meters.
@@ -31,7 +32,7 @@ pub fn aisle(seed: u64, period_m: f64, settings: &AlignmentSettings) -> Option<[
         let truth = place(step);
         let points = seen(&lidar, &scene, &truth, &mut random);
         if step >= 2 {
-            let map = mapped(scans.iter(), SIMULATED_M)?;
+            let map = mapped(scans.iter(), SIMULATED_M, ViewpointSettings::default())?;
             let odometry = PosePrior {
                 covariance: covariance(ODOMETRY),
                 ..(truth * noise(ODOMETRY, &mut random)).into()

@@ -9,6 +9,7 @@ use super::trial::{SIMULATED_M, aligned, carved, lidar, mapped, on_floor, seen};
 use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
+use mrol_map::mapping::ViewpointSettings;
 use mrol_simulate::Scene;
 
 /// Pieces of furniture in rectangular rooms.
@@ -96,7 +97,7 @@ pub fn rooms(
         }
         let scans: Vec<_> =
             places.iter().map(|pose| (seen(&lidar, &scene, pose, &mut random), *pose)).collect();
-        let map = mapped(scans.iter(), SIMULATED_M)?;
+        let map = mapped(scans.iter(), SIMULATED_M, ViewpointSettings::default())?;
         let (last, crowd) = (*places.last()?, random.random());
         let after = |turn_deg: f64| {
             last * Pose::new(Vector3::new(0.2, -0.1, 0.0), Vector3::z() * turn_deg.to_radians())

@@ -9,6 +9,7 @@ use crate::workload::Scan;
 use mrol_map::align::{AlignmentSettings, RayAgreement, ray_agreement};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
+use mrol_map::mapping::ViewpointSettings;
 
 /// How far guesses are off, meters and degrees.
 pub const GUESSES: [(f64, f64); 5] = [(0.1, 3.0), (0.3, 10.0), (1.0, 30.0), (3.0, 90.0), (8.0, 180.0)];
@@ -54,6 +55,8 @@ pub struct Set {
     pub name: String,
     /// The place that it shows: sets of the same place have the same.
     pub place: String,
+    /// Which scans leave viewpoints in its maps.
+    pub viewpoints: ViewpointSettings,
     scans: Vec<(Vec<Point>, Pose)>,
     resolution_m: f64,
 }
@@ -73,7 +76,8 @@ impl Set {
         let stride = scans.len().div_ceil(most.max(1)).max(1);
         let posed = scans.into_iter().step_by(stride);
         let scans = posed.filter_map(|scan| Some((scan.points, scan.map_from_sensor?))).collect();
-        Self { name: name.into(), place: place.into(), scans, resolution_m }
+        let viewpoints = ViewpointSettings::default();
+        Self { name: name.into(), place: place.into(), viewpoints, scans, resolution_m }
     }
 
     /// A map of some of its scans at their true poses; none of settings out of range, or where no scan is left to
@@ -82,7 +86,7 @@ impl Set {
         let count = self.scans.len();
         let (of_map, others): (Vec<_>, Vec<_>) =
             self.scans.iter().enumerate().partition(|(k, _)| which.has(*k, count));
-        let map = mapped(of_map.iter().map(|(_, scan)| *scan), self.resolution_m)?;
+        let map = mapped(of_map.iter().map(|(_, scan)| *scan), self.resolution_m, self.viewpoints)?;
         let others: Vec<_> = others.into_iter().map(|(_, scan)| scan).collect();
         let of_map = of_map.iter().map(|(_, (_, pose))| *pose).collect();
         (!others.is_empty()).then_some(Trials { map, of_map, others, resolution_m: self.resolution_m })

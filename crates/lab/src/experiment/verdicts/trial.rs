@@ -10,7 +10,9 @@ use crate::experiment::convergence::direction;
 use mrol_map::align::{Alignment, AlignmentSettings, PoseCovariance, PosePrior, align_until};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{MapSettings, MultiResolutionMap, RobotName};
-use mrol_map::mapping::{CarvingSettings, Guess, LocatedScan, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol_map::mapping::{
+    CarvingSettings, Guess, LocatedScan, MappingSettings, Scan, ScanMapper, Sightings, ViewpointSettings,
+};
 use mrol_map::util::StopSignal;
 use mrol_simulate::{Scene, SpinningLidar, gaussian};
 
@@ -29,14 +31,16 @@ pub(super) fn off_by(truth: &Pose, (meters, degrees): (f64, f64), random: &mut C
     Pose::from_parts(shift * truth.translation, turn * truth.rotation)
 }
 
-/// A map of scans at their poses, with the viewpoints that they leave.
+/// A map of scans at their poses, with the viewpoints that they leave under these settings.
 pub(super) fn mapped<'s>(
     scans: impl Iterator<Item = &'s (Vec<Point>, Pose)>,
     resolution_m: f64,
+    viewpoints: ViewpointSettings,
 ) -> Option<MultiResolutionMap> {
     let map = MultiResolutionMap::new(MapSettings::new(resolution_m, 5)).ok()?;
     let (robot, sightings) = (RobotName::new("surveyor").ok()?, Sightings::default());
-    let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
+    let mapper =
+        ScanMapper::new(&map, &sightings, MappingSettings { viewpoints, ..MappingSettings::default() });
     for (points, pose) in scans {
         let scan = Scan { guess: Guess::Pose(*pose), at_guess: true, ..Scan::new(&robot, points) };
         mapper.map_scan(&scan, StopSignal::NEVER).ok()?;

@@ -58,8 +58,8 @@ impl Refinement<'_> {
             true => self.refined(&scan, &fit.map_from_sensor).unwrap_or(fit),
             false => fit,
         });
-        let ends = rank(refined.collect());
-        let best = contest.decide_among(&ends);
+        let mut ends = rank(refined.collect());
+        let best = contest.decide_among(&mut ends);
         Some(Judged { candidates: candidates(&ends, &best.map_from_sensor), best })
     }
 

@@ -11,6 +11,9 @@ const POINTS_MIN: i64 = 6;
 /// scan line in a voxel is a line, not a surface: to align to it would be to align to the sensor's pattern (paper
 /// III-B: the voxels "have to be large enough to cover gaps in the point cloud due to scan line spacing").
 const SPREAD_MIN: f64 = 0.005;
+/// Points are a plane if their smallest variance is at most this fraction of the middle one.
+const FLATNESS_MAX: f64 = 0.1;
+
 /// How soft a Gaussian is: how far a point may lie from its surface before that counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Softness {
@@ -92,6 +95,18 @@ impl Gaussian {
     /// The vector from the mean to a point of the map frame, meters.
     pub(super) fn to(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         point_m - self.mean_m
+    }
+
+    /// The height of a place of the map frame above the surface, meters; none where the points are no plane. Which side
+    /// is above is arbitrary, and the same for all places.
+    pub(super) fn height_m(&self, place_m: &Vector3<f64>) -> Option<f64> {
+        let [thin, middle, _] = {
+            let mut axes = [0, 1, 2];
+            axes.sort_by(|&a, &b| self.variances[a].total_cmp(&self.variances[b]));
+            axes
+        };
+        let is_flat = self.variances[thin] <= FLATNESS_MAX * self.variances[middle];
+        is_flat.then(|| self.axes.column(thin).dot(&self.to(place_m)))
     }
 
     /// The squared Mahalanobis distance of a point of the map frame.

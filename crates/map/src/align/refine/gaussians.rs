@@ -82,6 +82,19 @@ impl VoxelGaussians {
         nearest.map(|(i, _)| i)
     }
 
+    /// True where two places (map frame) lie on the same side of the surface that a point belongs to; none where it
+    /// belongs to no plane.
+    pub(in crate::align) fn is_one_side(
+        &mut self,
+        moments: &KnownMoments<'_>,
+        point_m: &Vector3<f64>,
+        places_m: [&Vector3<f64>; 2],
+    ) -> Option<bool> {
+        let surface = self.nearest(moments, point_m)?;
+        let [a, b] = places_m.map(|place_m| self.get(surface).height_m(place_m));
+        Some(a? * b? > 0.0)
+    }
+
     /// Indices of the Gaussians that a point may belong to in voxels of a size: its own voxel's or, failing that, the
     /// neighbors'.
     fn near_of(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>, size: usize) -> Near {

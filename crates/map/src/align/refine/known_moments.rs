@@ -6,14 +6,14 @@ use crate::voxel::{Moments, VoxelKey};
 /// The moments of a map's points; of one that keeps none, those of the centers of its finest voxels, as they are when
 /// they are asked for.
 #[derive(Debug)]
-pub(super) struct KnownMoments<'a> {
+pub(in crate::align) struct KnownMoments<'a> {
     map: &'a MultiResolutionMap,
     kept: Option<MomentsView<'a>>,
 }
 
 impl<'a> KnownMoments<'a> {
     /// What there is of `map`; moments that it keeps do not change meanwhile.
-    pub(super) fn of(map: &'a MultiResolutionMap) -> Self {
+    pub(in crate::align) fn of(map: &'a MultiResolutionMap) -> Self {
         Self { map, kept: map.moments() }
     }
 

@@ -12,4 +12,5 @@ mod known_moments;
 mod refinement;
 
 pub(super) use gaussians::VoxelGaussians;
+pub(super) use known_moments::KnownMoments;
 pub(super) use refinement::{refine, surface_fit};
