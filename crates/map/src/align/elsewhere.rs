@@ -10,7 +10,6 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::agreement::spread;
 use super::ascent::{Ascent, Steps};
-use super::ends::EVIDENCE_MIN;
 use super::overlap::Overlap;
 use super::sampled_scan::SampledScan;
 use super::settings::AlignmentSettings;
@@ -92,8 +91,8 @@ pub(super) fn shifted(
 }
 
 /// Where a scan that was found at `pose`, and is contradicted there, may have been taken on another floor, up to
-/// `possible_m` above or below. That may be mapped less than this one: it need not fit as well, but as well as rays
-/// have to tell anything of it.
+/// `possible_m` above or below. That may be mapped less than this one, so that it need not fit as well. But a floor fits
+/// a ceiling anywhere, and above that nobody looked.
 pub(super) fn on_other_floors(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
@@ -102,7 +101,7 @@ pub(super) fn on_other_floors(
     settings: &AlignmentSettings,
 ) -> Vec<Pose> {
     let few = Few::of(map, scan, LEVEL_OF_SHIFTS, settings);
-    let least = EVIDENCE_MIN * few.points.len() as f64;
+    let least = AS_GOOD_ASIDE * few.overlap(few.level).at(&[*pose], few.stop)[0] as f64;
     let mut peaks = few.peaks(pose, [(Vector3::z(), possible_m)], least);
     let above_m = |peak: &Pose| (peak.translation.vector - pose.translation.vector).norm();
     peaks.retain(|peak| above_m(peak) >= STOREY_MIN_M);

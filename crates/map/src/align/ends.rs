@@ -22,7 +22,7 @@ const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
 /// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
 /// nothing of each other cannot be compared.
-pub(super) const EVIDENCE_MIN: f64 = 0.2;
+const EVIDENCE_MIN: f64 = 0.2;
 const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
 /// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
