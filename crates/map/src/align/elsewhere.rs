@@ -91,8 +91,8 @@ pub(super) fn shifted(
 }
 
 /// Where a scan that was found at `pose`, and is contradicted there, may have been taken on another floor, up to
-/// `possible_m` above or below. That may be mapped less than this one, so that it need not fit as well. But a floor fits
-/// a ceiling anywhere, and above that nobody looked.
+/// `possible_m` above or below. That may be mapped less than this one, so that it need not fit as well. But a floor
+/// fits a ceiling anywhere, and above that nobody looked.
 pub(super) fn on_other_floors(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
