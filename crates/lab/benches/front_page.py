@@ -6,7 +6,7 @@
     crates/lab/benches/front_page.py SHARED_DATA
 
 SHARED_DATA has the sets `uos_3dtk_dat`, `icl_office_kt0` and `balm_hall_consecutive`. All programs run on one core, one after
-the other. A figure of look-ups is the least of ten runs, as in docs/measurements.md; times of alignments are medians.
+the other. A figure of look-ups is the least of ten runs; times of alignments are medians.
 """
 
 import argparse

@@ -26,8 +26,7 @@ const POSES_MAX: usize = 16 << 10;
 /// The level that rays are cast on: its voxels close the gaps that the finest leave between the rays of a scan.
 const LEVEL: u32 = 1;
 /// Rays along the side of each face of a cube: 1.1 degrees apart, hardly more than the finest pixels of a scan's image.
-/// With half as many, what they met behind the gap between two rings of a lidar contradicted up to a fifth of the
-/// points at true poses, now a fiftieth.
+/// Fewer pass between two rings of a lidar, and what they meet behind contradicts points at true poses.
 const RAYS_OF_SIDE: usize = 80;
 /// What a ray passes before it counts as having met something, voxels of its level: a robot may be in the map itself.
 const BEGINS_VOXELS: f32 = 2.0;

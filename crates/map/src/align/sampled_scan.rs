@@ -41,6 +41,7 @@ impl<'a> SampledScan<'a> {
         let surfaces = RefCell::new(VoxelGaussians::new(lattice.resolution_m(0)));
         Self { points, sample, surface_sample: fine.points, surfaces, stop }
     }
+
     /// The same scan, of which `surface_sample` alone is refined with.
     pub(super) fn with_surface_sample(&self, surface_sample: Vec<Point>, lattice: &Lattice) -> Self {
         let surfaces = RefCell::new(VoxelGaussians::new(lattice.resolution_m(0)));
