@@ -282,8 +282,8 @@ impl<'a> Ends<'a> {
             && (both <= CONTRADICTED_MIN || both <= UNUSUAL * self.contradicted_among_witnesses())
     }
 
-    /// True of an end that rays contradict on one side or both, by more than the witnesses contradict each other. People
-    /// and moved things cause that, and so does a pose on the wrong floor.
+    /// True of an end that rays contradict on one side or both, by more than the witnesses contradict each other.
+    /// People and moved things cause that, and so does a pose on the wrong floor.
     pub(super) fn is_contradicted(&self, end: &End) -> bool {
         let most = 1.0 - end.agreement.worse();
         most > CONTRADICTED_MIN && most > UNUSUAL * self.contradicted_among_witnesses()
