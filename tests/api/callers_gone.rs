@@ -1,15 +1,18 @@
 //! Work whose caller is gone stops: while it waits, while it is in hand, and in streams; a deadline is a caller that
-//! goes.
+//! goes. Where all places to wait are taken, a request is refused and told when to come again.
 
 use std::time::{Duration, Instant};
 
 use mrol::wire::pb;
+use reqwest::StatusCode;
+use serde_json::json;
 use tokio::task::JoinHandle;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Status};
 
 use crate::support::daemon::{
-    Daemon, PATIENCE, bytes_of, client, corner, guess_pb, json_of, points_pb, query_pb, row, scan_pb,
+    Daemon, PATIENCE, bytes_of, client, corner, guess_pb, identity_json, json_of, points_pb, query_pb, row,
+    scan_pb,
 };
 
 /// So many that an ascent with all of them takes minutes.
@@ -79,6 +82,12 @@ async fn jobs_whose_callers_have_gone_are_not_begun_and_one_in_hand_stops() {
     until(&daemon, "waiting", 4).await;
     let refused = daemon.mapping().await.align_scan(endless()).await.unwrap_err();
     assert!(refused.message().contains("jobs_waiting_max is 4"), "{refused:?}");
+    let scan = json!({"robot": "r2", "points": row(10), "guess": identity_json()});
+    let refused = daemon.post("/v1/maps/a/alignment", scan).await;
+    assert_eq!(refused.status(), StatusCode::TOO_MANY_REQUESTS);
+    assert_eq!(refused.headers()["retry-after"], "1");
+    let detail = json_of(refused).await["detail"].as_str().expect("a detail").to_owned();
+    assert!(detail.contains("jobs_waiting_max is 4"), "{detail}");
 
     waiting.iter().for_each(JoinHandle::abort);
     until(&daemon, "waiting", 0).await;

@@ -18,7 +18,7 @@ use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, HealthCheckResponse};
 
 use crate::support::daemon::{
-    Daemon, PATIENCE, bytes_of, client, identity_json, json_of, pose_json, query_pb, row, scan_pb, wait_until,
+    Daemon, PATIENCE, bytes_of, client, json_of, pose_json, query_pb, row, scan_pb, wait_until,
 };
 use crate::support::map_folders::folder_of;
 use crate::support::process::Process;
@@ -296,33 +296,6 @@ async fn probes_answer_while_every_pool_thread_is_busy() {
     // Who waited for a thread would wait for a third of all.
     let bound = (all / 4).max(Duration::from_secs(1));
     assert!(slowest < bound, "three probes took {slowest:?}, all alignments {all:?}");
-}
-
-#[tokio::test]
-async fn a_full_queue_refuses_and_says_when_to_come_again() {
-    let daemon = Daemon::start_with(|config| {
-        config.threads.mapping = 1;
-        config.limits.jobs_waiting_max = 1;
-    });
-    let daemon = daemon.await;
-    daemon.make_map("a").await;
-    let scan = json!({"robot": "r", "points": large_scan(20_000), "guess": identity_json()});
-    // On a map that is empty an alignment takes no time.
-    assert_eq!(daemon.post("/v1/maps/a/scans", scan.clone()).await.status(), StatusCode::OK);
-    let align = client().post(daemon.url("/v1/maps/a/alignment")).json(&scan);
-    let sent: Vec<_> = (0..24).map(|_| tokio::spawn(align.try_clone().unwrap().send())).collect();
-    let mut refused = 0;
-    for answer in sent {
-        let answer = answer.await.unwrap().unwrap();
-        if answer.status() == StatusCode::TOO_MANY_REQUESTS {
-            assert_eq!(answer.headers()["retry-after"], "1");
-            let message = json_of(answer).await["detail"].as_str().unwrap().to_owned();
-            assert!(message.contains("jobs_waiting_max is 1"), "{message}");
-            refused += 1;
-        }
-    }
-    assert!(refused > 0);
-    assert_eq!(daemon.get("/metrics").await.status(), StatusCode::OK);
 }
 
 #[tokio::test]
