@@ -28,7 +28,7 @@ pub enum ConfigError {
         /// The setting.
         key: &'static str,
         /// The range, as text.
-        range: &'static str,
+        range: String,
         /// The value that was given.
         value: String,
     },

@@ -38,7 +38,8 @@ impl Config {
             return Err(ConfigError::Renamed { old, new });
         }
         let config: Self = figment.extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
-        config.checked()
+        let (limits, constants) = config.limits.clone().with_constants();
+        Self { limits, constants_set: constants, ..config }.checked()
     }
 }
 

@@ -1,23 +1,21 @@
 //! Section `log` of the settings.
 
-use serde::{Deserialize, Serialize};
+use mrol_service::{SettingKind, SettingValue, settings};
 
 use crate::telemetry::LogFormat;
 
-/// Settings of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LogConfig {
-    /// Format of log lines: `text` or `json`.
-    pub format: LogFormat,
-    /// Least level of log lines, or a list of `target=level`. `info`.
-    pub level: String,
-    /// Whether changes and refused keys are written to the log, whatever the level. True.
-    pub audit: bool,
+settings! {
+    /// Settings of the log.
+    pub struct LogConfig in "log" {
+        /// Format of log lines: `text` or `json`.
+        format: LogFormat = LogFormat::Text; none;
+        /// Least level of log lines, or a list of `target=level`.
+        level: String = "info".into(); none;
+        /// Write changes and refused keys to the log, whatever its level.
+        audit: bool = true; none;
+    }
 }
 
-impl Default for LogConfig {
-    fn default() -> Self {
-        Self { format: LogFormat::Text, level: "info".into(), audit: true }
-    }
+impl SettingValue for LogFormat {
+    const KIND: SettingKind = SettingKind::Text;
 }

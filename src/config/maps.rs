@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use mrol_service::settings;
 
-/// Which maps are kept in memory.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MapsConfig {
-    /// Seconds after which a map that nobody uses or watches is saved and leaves memory; the next request opens it. 0
-    /// means never, and is the default.
-    pub sleep_after_s: u64,
+use super::settings::MANY;
+
+settings! {
+    /// Which maps are kept in memory.
+    pub struct MapsConfig in "maps" {
+        /// Time after which a map that nobody uses or watches is saved and leaves memory; the next request opens it. 0
+        /// = never.
+        sleep_after_s: u64 = 0; s, from 0, to MANY;
+    }
 }
 
 impl MapsConfig {

@@ -1,6 +1,7 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
 mod access;
+mod documented;
 mod error;
 mod filter;
 mod limits;

@@ -1,81 +1,59 @@
 //! Sections `alignment` and `robots` of the settings.
 
-use serde::{Deserialize, Serialize};
-
 use crate::json::ByKeyword;
 use mrol_map::align::Method;
-use mrol_map::mapping::{CarvingSettings, OdometrySettings};
+use mrol_map::mapping::{CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings};
 use mrol_map::scan::PointFilter;
-use mrol_service::RobotSettings;
+use mrol_service::{RobotSettings, SettingKind, SettingValue, settings};
 
-/// Settings of alignment.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AlignmentConfig {
-    /// Method of alignment for requests that do not say: `refined` or `overlap`. `refined`.
-    pub method: ByKeyword<Method>,
-}
-
-/// Settings of a robot's scans; a request may override each value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotConfig {
-    /// Least range: points nearer to the sensor than this are skipped, meters.
-    pub range_min_m: Option<f64>,
-    /// Largest range: points farther from the sensor than this are skipped, meters.
-    pub range_max_m: Option<f64>,
-    /// How far "no return" reaches: points at this distance and farther say that nothing was met up to here, and are
-    /// skipped, meters.
-    pub no_return_m: Option<f64>,
-    /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
-    /// skipped.
-    pub body_m: Option<[[f64; 3]; 2]>,
-    /// Points at exactly 0 0 0 count as any other. false: they are skipped, since most drivers write them where nothing
-    /// returned.
-    pub keep_zeros: bool,
-    /// Points beyond `range_max_m` say nothing. false: they tell that nothing was met up to there.
-    pub beyond_range_is_noise: bool,
-    /// Look for the robot where its scans are refused. false.
-    pub recover: bool,
-    /// Take out of the map what the robot's scans saw through. false.
-    pub carve: bool,
-    /// Voxels around the surface that a scan shows that it never takes out. 1.
-    pub carve_margin_voxels: u32,
-    /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken
-    /// out, degrees. 8.
-    pub carve_grazing_deg: f64,
-    /// Voxels farther from the sensor than this are not taken out, meters. 20.
-    pub carve_range_max_m: f64,
-    /// Standard deviation of the length of a `motion`, as a share of it. 0.1.
-    pub odometry_way_share: f64,
-    /// Standard deviation of the turn of a `motion`, as a share of it. 0.1.
-    pub odometry_turn_share: f64,
-}
-
-impl Default for RobotConfig {
-    fn default() -> Self {
-        let CarvingSettings { margin_voxels, grazing_deg, range_max_m } = CarvingSettings::default();
-        let OdometrySettings { way_share, turn_share, .. } = OdometrySettings::default();
-        Self {
-            range_min_m: None,
-            range_max_m: None,
-            no_return_m: None,
-            body_m: None,
-            keep_zeros: false,
-            beyond_range_is_noise: false,
-            recover: false,
-            carve: false,
-            carve_margin_voxels: margin_voxels,
-            carve_grazing_deg: grazing_deg,
-            carve_range_max_m: range_max_m,
-            odometry_way_share: way_share,
-            odometry_turn_share: turn_share,
-        }
+settings! {
+    /// Settings of alignment.
+    pub struct AlignmentConfig in "alignment" {
+        /// Method for requests that do not say: `refined` or `overlap`.
+        method: ByKeyword<Method> = ByKeyword::default(); none;
     }
 }
 
+settings! {
+    /// Settings of a robot's scans; a request may override each value.
+    pub struct RobotConfig in "robots.NAME" {
+        /// Nearer points are skipped.
+        range_min_m: Option<f64> = None; m;
+        /// Farther points are skipped.
+        range_max_m: Option<f64> = None; m;
+        /// Points at this distance and farther mean "no return": nothing was met up to here. They are skipped.
+        no_return_m: Option<f64> = None; m;
+        /// Box of the robot's own body in the sensor frame: smallest and largest corner. Points within it are skipped.
+        body_m: Option<[[f64; 3]; 2]> = None; m;
+        /// Points at exactly `0 0 0` count as any other. Otherwise they are skipped, since most drivers write them
+        /// where nothing returned.
+        keep_zeros: bool = false; none;
+        /// Points beyond `range_max_m` say nothing. Otherwise they tell that nothing was met up to there.
+        beyond_range_is_noise: bool = false; none;
+        /// Look for the robot where its scans are refused.
+        recover: bool = false; none;
+        /// Take out of the map what the robot's scans saw through.
+        carve: bool = false; none;
+        /// Voxels around the surface that a scan shows that it never takes out.
+        carve_margin_voxels: u32 = CarvingSettings::default().margin_voxels; none, from 1, to 8;
+        /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken
+        /// out.
+        carve_grazing_deg: f64 = CarvingSettings::default().grazing_deg; deg, from 1, to 80;
+        /// Voxels farther from the sensor than this are not taken out.
+        carve_range_max_m: f64 = CarvingSettings::default().range_max_m; m, to 200;
+        /// Standard deviation of the length of a `motion` that comes without a covariance, as a share of it.
+        odometry_way_share: f64 = OdometrySettings::default().way_share; none, from 0, to ODOMETRY_SHARE_MAX;
+        /// Standard deviation of its turn, as a share of it.
+        odometry_turn_share: f64 = OdometrySettings::default().turn_share; none, from 0, to ODOMETRY_SHARE_MAX;
+    }
+}
+
+impl<T> SettingValue for ByKeyword<T> {
+    const KIND: SettingKind = SettingKind::Text;
+}
+
 impl RobotConfig {
-    pub(super) fn settings(&self) -> RobotSettings {
+    pub(super) fn of_robot(&self) -> RobotSettings {
         RobotSettings {
             filter: self.filter(),
             recover: self.recover,

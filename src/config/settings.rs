@@ -3,6 +3,7 @@
 use super::access::AccessConfig;
 use super::error::ConfigError;
 use super::filter::FilterConfig;
+use super::limits;
 use super::listener::ListenerConfig;
 use super::log::LogConfig;
 use super::maps::MapsConfig;
@@ -11,7 +12,6 @@ use super::scans::RobotConfig;
 use super::store::StoreConfig;
 use super::threads::ThreadsConfig;
 use super::tls::TlsConfig;
-use super::{access, limits};
 use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
 use std::path::PathBuf;
@@ -22,10 +22,12 @@ use serde::{Deserialize, Serialize};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::mapping::StationarySettings;
-use mrol_service::{Limits, ServiceSettings};
+use mrol_service::{Limits, OutOfRange, ServiceSettings, Setting, SettingKind, Unit};
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
-const DRAIN_DELAY_MAX_S: u64 = 3600;
+const DRAIN_DELAY_MAX_S: f64 = 3600.0;
+/// The largest number of many things.
+pub(super) const MANY: u32 = 1 << 20;
 
 /// All settings of the daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,6 +64,9 @@ pub struct Config {
     pub robots: BTreeMap<String, RobotConfig>,
     /// Limits of the server; each is named in the error of a request beyond it.
     pub limits: Limits,
+    /// Constants that the file, a variable or an option sets: they were settings once, and what is set does not count.
+    #[serde(skip)]
+    pub constants_set: Vec<&'static str>,
 }
 
 impl Default for Config {
@@ -83,6 +88,7 @@ impl Default for Config {
             alignment: AlignmentConfig::default(),
             robots: BTreeMap::new(),
             limits: Limits::default(),
+            constants_set: Vec::new(),
         }
     }
 }
@@ -90,36 +96,11 @@ impl Default for Config {
 impl Config {
     /// Refuses numbers that would stop the server from working at all.
     pub(super) fn checked(self) -> Result<Self, ConfigError> {
-        let range = |key, range, value: String| Err(ConfigError::Range { key, range, value });
-        for (key, value) in [
-            ("store.snapshot_journal_mib", self.store.snapshot_journal_mib),
-            ("store.snapshot_interval_s", self.store.snapshot_interval_s),
-        ] {
-            if !(1..=1 << 20).contains(&value) {
-                return range(key, "1 to 1048576", value.to_string());
-            }
-        }
-        if self.maps.sleep_after_s > 1 << 20 {
-            return range("maps.sleep_after_s", "0 to 1048576", self.maps.sleep_after_s.to_string());
-        }
-        for (key, threads) in [
-            ("threads.query", self.threads.query),
-            ("threads.planning_beside_robots", self.threads.planning_beside_robots),
-            ("threads.mapping", self.threads.mapping),
-            ("threads.alignment", self.threads.alignment),
-            ("threads.localization", self.threads.localization),
-        ] {
-            if threads > 1024 {
-                return range(key, "0 to 1024", threads.to_string());
-            }
-        }
-        if self.drain_delay_s > DRAIN_DELAY_MAX_S {
-            return range("drain_delay_s", "0 to 3600", self.drain_delay_s.to_string());
+        if let Some(OutOfRange { key, range, value }) = self.out_of_range() {
+            return Err(ConfigError::Range { key, range, value });
         }
         limits::check(&self.limits)?;
         self.access.check()?;
-        access::check_warning("tls.expiry_warning_days", self.tls.expiry_warning_days)?;
-        self.store.check()?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }
@@ -137,12 +118,65 @@ impl Config {
         Ok(self)
     }
 
+    /// The first value that is out of the range of its row.
+    fn out_of_range(&self) -> Option<OutOfRange> {
+        let [_, _, delay] = Self::top();
+        let seconds = f64::from(u32::try_from(self.drain_delay_s).unwrap_or(u32::MAX));
+        let of_section = [
+            delay.out_of_range("drain_delay_s", seconds),
+            self.store.out_of_range(),
+            self.maps.out_of_range(),
+            self.access.out_of_range(),
+            self.tls.out_of_range(),
+            self.threads.out_of_range(),
+            self.filter.out_of_range(),
+            self.limits.out_of_range(),
+        ];
+        of_section.into_iter().flatten().next()
+    }
+
+    /// The rows of the settings outside of any section.
+    pub(super) fn top() -> [Setting; 3] {
+        let row = |name, kind, unit, most: Option<f64>, sentence: &str| Setting {
+            name,
+            kind,
+            unit,
+            least: most.map(|_| 0.0),
+            most,
+            sentence: sentence.into(),
+        };
+        [
+            row(
+                "data_dir",
+                SettingKind::Text,
+                Unit::none,
+                None,
+                "Where maps are kept across restarts; an empty path keeps them in memory only.",
+            ),
+            row(
+                "drain_seconds",
+                SettingKind::Integer,
+                Unit::s,
+                None,
+                "Time that requests in flight may take when the server goes down, and again (at least 5 s) saving the maps.",
+            ),
+            row(
+                "drain_delay_s",
+                SettingKind::Integer,
+                Unit::s,
+                Some(DRAIN_DELAY_MAX_S),
+                "Time to serve on after the server was told to end, while `/readyz` says that it is not ready: for balancers \
+                 that look at it now and then. 5 in the container image.",
+            ),
+        ]
+    }
+
     /// The settings that the service is opened with.
     pub fn service_settings(&self) -> ServiceSettings {
         let FilterConfig { hashes, bits_per_key } = self.filter;
         ServiceSettings {
             data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
-            store: self.store.settings(),
+            store: self.store.of_store(),
             limits: self.limits.clone(),
             gauges: None,
             observers: Vec::new(),
@@ -153,7 +187,7 @@ impl Config {
             localization_threads: self.threads.localization,
             alignment: AlignmentSettings { method: self.alignment.method.0, ..AlignmentSettings::default() },
             stationary: StationarySettings::default(),
-            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.settings())).collect(),
+            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.of_robot())).collect(),
             filter: FilterSettings { hashes, bits_per_key },
             sleep_after: self.maps.sleep_after(),
         }

@@ -2,76 +2,41 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-
-use super::error::ConfigError;
+use super::settings::MANY;
 use mrol_map::map::TrajectorySpacing;
+use mrol_service::settings;
 use mrol_store::{Durability, StoreMode, StoreSettings};
 
-/// Settings of the store; see [`StoreSettings`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StoreConfig {
-    /// When a change is acknowledged: `always`, once it is synced; or an interval (`200ms`, `1s`) at which the journal
-    /// is synced. `always`.
-    #[serde(with = "as_text")]
-    pub durability: Durability,
-    /// Size of a map's journal, MiB, from which on a snapshot is written. 32.
-    pub snapshot_journal_mib: u64,
-    /// Seconds after which a snapshot of a changed map is written. 300.
-    pub snapshot_interval_s: u64,
-    /// Least number of revisions within which a scan can be undone. 20,000.
-    pub undo_revisions: u64,
-    /// Most bytes of snapshots and journal that are kept for undo alone. 4 GiB.
-    pub undo_bytes_max: u64,
-    /// Bytes of each map's last changes that are kept in memory for who watches it. 16 MiB.
-    pub watch_bytes_max: usize,
-    /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
-    /// execution. `0700`.
-    #[serde(with = "as_text")]
-    pub mode: StoreMode,
-    /// Distance between kept poses, meters; see [`TrajectorySpacing::distance_m`]. 0.5.
-    pub trajectory_spacing_m: f64,
-    /// Rotation between kept poses, degrees; see [`TrajectorySpacing::rotation_deg`]. 10.
-    pub trajectory_spacing_deg: f64,
-    /// Time between kept poses, seconds; see [`TrajectorySpacing::seconds`]. 60.
-    pub trajectory_spacing_s: f64,
-}
-
-impl Default for StoreConfig {
-    fn default() -> Self {
-        let store = StoreSettings::default();
-        Self {
-            durability: store.durability,
-            snapshot_journal_mib: store.snapshot_journal_bytes >> 20,
-            snapshot_interval_s: store.snapshot_interval.as_secs(),
-            undo_revisions: store.undo_revisions,
-            undo_bytes_max: store.undo_bytes_max,
-            watch_bytes_max: store.watch_bytes_max,
-            mode: store.mode,
-            trajectory_spacing_m: store.trajectory_spacing.distance_m,
-            trajectory_spacing_deg: store.trajectory_spacing.rotation_deg,
-            trajectory_spacing_s: store.trajectory_spacing.seconds,
-        }
+settings! {
+    /// Settings of the store; see [`StoreSettings`].
+    pub struct StoreConfig in "store" {
+        /// A change is acknowledged when it is synced (`always`); or a sync interval (`200ms`, `1s`; 1 ms to 1 h).
+        durability: Durability = StoreSettings::default().durability; none, #[serde(with = "as_text")];
+        /// Journal after which a map is written to a snapshot.
+        snapshot_journal_mib: u64 = StoreSettings::default().snapshot_journal_bytes >> 20; MiB, from 1, to MANY;
+        /// Time after which a map that changed is written to a snapshot.
+        snapshot_interval_s: u64 = StoreSettings::default().snapshot_interval.as_secs(); s, from 1, to MANY;
+        /// Revisions behind the newest within which scans can be undone, unless `undo_bytes_max` or a full disk ends it
+        /// sooner.
+        undo_revisions: u64 = StoreSettings::default().undo_revisions; none;
+        /// Snapshots and journal of a map that are kept for undo alone.
+        undo_bytes_max: u64 = StoreSettings::default().undo_bytes_max; bytes;
+        /// A map's last changes that are kept in memory for those who watch it.
+        watch_bytes_max: usize = StoreSettings::default().watch_bytes_max; bytes;
+        /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
+        /// execution.
+        mode: StoreMode = StoreSettings::default().mode; none, #[serde(with = "as_text")];
+        /// Distance between old poses that are kept.
+        trajectory_spacing_m: f64 = StoreSettings::default().trajectory_spacing.distance_m; m, from 0.01, to 1000;
+        /// Rotation between them.
+        trajectory_spacing_deg: f64 = StoreSettings::default().trajectory_spacing.rotation_deg; deg, from 0.1, to 360;
+        /// Time between them.
+        trajectory_spacing_s: f64 = StoreSettings::default().trajectory_spacing.seconds; s, from 0.1, to 1_000_000;
     }
 }
 
 impl StoreConfig {
-    /// Refuses a spacing that is negative or not finite.
-    pub(super) fn check(&self) -> Result<(), ConfigError> {
-        for (key, value, range, least, most) in [
-            ("store.trajectory_spacing_m", self.trajectory_spacing_m, "0.01 to 1000", 0.01, 1000.0),
-            ("store.trajectory_spacing_deg", self.trajectory_spacing_deg, "0.1 to 360", 0.1, 360.0),
-            ("store.trajectory_spacing_s", self.trajectory_spacing_s, "0.1 to 1000000", 0.1, 1e6),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(ConfigError::Range { key, range, value: value.to_string() });
-            }
-        }
-        Ok(())
-    }
-
-    pub(super) fn settings(&self) -> StoreSettings {
+    pub(super) fn of_store(&self) -> StoreSettings {
         StoreSettings {
             durability: self.durability,
             snapshot_journal_bytes: self.snapshot_journal_mib << 20,

@@ -3,27 +3,23 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use mrol_service::settings;
 
-/// Settings of TLS for the TCP connections of both protocols. Without a certificate they are not encrypted. Unix
-/// sockets never are.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TlsConfig {
-    /// Path of the server's certificate, PEM, followed by its signers.
-    pub certificate: Option<PathBuf>,
-    /// Path of the certificate's private key, PEM.
-    pub key: Option<PathBuf>,
-    /// Path of the certificates, PEM, that sign those of clients. Where it is given, a client needs such a certificate
-    /// to connect.
-    pub client_ca: Option<PathBuf>,
-    /// Number of days before a certificate expires from which on the log warns of it once a day; 0 to 3650. 14.
-    pub expiry_warning_days: u32,
-}
+use super::access::WARNING_DAYS_MAX;
 
-impl Default for TlsConfig {
-    fn default() -> Self {
-        Self { certificate: None, key: None, client_ca: None, expiry_warning_days: 14 }
+settings! {
+    /// Settings of TLS for the TCP connections of both protocols. Without a certificate they are not encrypted. Unix
+    /// sockets never are.
+    pub struct TlsConfig in "tls" {
+        /// Path of the server's certificate, PEM, followed by its signers.
+        certificate: Option<PathBuf> = None; none;
+        /// Path of the certificate's private key, PEM.
+        key: Option<PathBuf> = None; none;
+        /// Path of the certificates, PEM, that sign those of clients. Where it is given, a client needs such a
+        /// certificate to connect.
+        client_ca: Option<PathBuf> = None; none;
+        /// How long before a certificate expires the log warns of it, once a day.
+        expiry_warning_days: u32 = 14; days, from 0, to WARNING_DAYS_MAX;
     }
 }
 

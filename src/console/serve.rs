@@ -117,6 +117,9 @@ impl Serve {
         for variable in unknown_variables() {
             tracing::warn!(variable, "is no setting and of no use here");
         }
+        for constant in &config.constants_set {
+            tracing::warn!(constant, "is a constant, and what is set of it does not count");
+        }
         let (hangups, mut shutdown) = (Hangups::hear(), pin!(shutdown_signal()));
         // Signals are handled from here on. The thread that opens maps is then abandoned at any point: nothing was
         // acknowledged, and files are written as a whole or not at all.

@@ -4,7 +4,7 @@
 //!
 //! Reading order of the rooms; none names a room of a later line:
 //!
-//! 1. `error`, `limits`, `request`: how a request fails, how much it may ask, what it asks and how it is answered.
+//! 1. `error`, `setting`, `limits`, `request`: how a request fails, how much it may ask, what it asks and how it is answered.
 //! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
 //! 3. `commit`: how changes of a map become durable, then visible, then acknowledged.
 //! 4. `maps`: the maps by name, and what a hosted map is made of.
@@ -25,6 +25,7 @@ mod read;
 mod request;
 mod resources;
 mod scan;
+mod setting;
 mod settings;
 #[cfg(feature = "testing")]
 mod testing;
@@ -37,7 +38,6 @@ pub use caller::{AllowedMaps, AllowedScans};
 pub use error::{ErrorCode, Reason, ReportedBy, ServiceError};
 pub use limits::{Limits, Marks};
 pub use map_service::MapService;
-pub use maps::EVENTS_MAX;
 pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};
 pub use question::{
     Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
@@ -59,6 +59,7 @@ pub use scan::{
     CANDIDATES_DEFAULT, CandidateAnswer, EventWatch, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
     TIME_LIMIT_DEFAULT, TrajectoryPieces,
 };
+pub use setting::{OutOfRange, Setting, SettingKind, SettingValue, Unit};
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use watch::Watch;
 pub use work::{Asker, LaneUse};

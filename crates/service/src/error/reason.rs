@@ -178,7 +178,7 @@ reasons! {
         Overloaded "overloaded" Both: "a limit on what is done at once, or on a caller's rate, is reached; the message names it", "wait as told, and retry";
         RecordTooLarge "record_too_large" Both: "one change of more than 2 GiB", "delete in parts";
         SearchTooLarge "search_too_large" Both: "the map exceeds `localization_grid_bytes_max`", "give a `search_box`";
-        TooManyKeepOuts "too_many_keep_outs" Both: "the map has `keep_outs_max` keep-outs", "delete one, or raise the limit";
+        TooManyKeepOuts "too_many_keep_outs" Both: "the map has `keep_outs_max` keep-outs", "delete one";
         TooManyMaps "too_many_maps" Both: "the server has `maps_max` maps", "delete one, or raise the limit";
         TooManyRobots "too_many_robots" Both: "the map has scans of `robots_per_map_max` robots, or of `robots_per_caller_max` that the caller brought in", "use their names, undo all scans of one, or raise the limit";
     }

@@ -1,248 +1,185 @@
-//! The limits, with their defaults, and the marks of disk and memory that are made of them.
-
-use serde::{Deserialize, Serialize};
+//! The limits as a table, and the marks of disk and memory that are made of them.
 
 use mrol_map::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 use mrol_map::mapping::VIEWPOINT_BYTES_MAX_DEFAULT;
 use mrol_map::planning::FIELD_BYTES_MAX_DEFAULT;
 
-/// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is
-/// named in the error of a request beyond it, and is a setting of the section `limits`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Limits {
-    /// Bytes of one HTTP body or one gRPC message. 32 MiB.
-    pub message_bytes_max: usize,
-    /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
-    /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
-    pub connections_max: usize,
-    /// Connections of each protocol besides, where all of those are in use: for one health check each, and for
-    /// `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives way, or one of the
-    /// peer that has most. 128.
-    pub connections_reserved: usize,
-    /// Seconds until a connection has to be secure and to begin to speak. 10.
-    pub connection_opening_max_s: f64,
-    /// Seconds that an HTTP connection may stay without a request, or take for a request's headers. 30.
-    pub http_idle_max_s: f64,
-    /// Seconds that a gRPC connection may stay without a call. 600.
-    pub grpc_idle_max_s: f64,
-    /// Requests in work, and as many whose bodies are arriving. 512.
-    pub requests_max: usize,
-    /// Calls whose client streams messages. 256.
-    pub streams_max: usize,
-    /// Bytes of bodies that have arrived, of what streams keep of them, and of answers, listings and files that are
-    /// being sent. 1 GiB.
-    pub body_bytes_max: usize,
-    /// How long a body may be silent before its end. 30 s.
-    pub body_silence_max_s: f64,
-    /// Bytes a second of a body that comes in time; what comes more slowly counts as silent for the time that its bytes
-    /// do not account for. 0 = any byte will do. 1024.
-    pub body_bytes_per_s_min: u32,
-    /// Requests and messages of streams a second of one caller: of a key, or of an address where there is none;
-    /// 0 = any number. 0.
-    pub caller_requests_per_s_max: u32,
-    /// As many may come at once. 100.
-    pub caller_burst_max: u32,
-    /// Requests and streams in work at a time of one key that says nothing of that itself; 0 = any number. Less than
-    /// half of `requests_max`, so that no key keeps the others out. 192.
-    pub caller_requests_at_once_max: u32,
-    /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are taken,
-    /// the oldest gives way. 64.
-    pub probes_max: usize,
-    /// Bytes of the body of a health check, which comes as it is: nothing is inflated. 1 KiB.
-    pub probe_body_bytes_max: usize,
-    /// How long the body of a health check may take. 5 s.
-    pub probe_time_max_s: f64,
-    /// Scrapes of the metrics that wait or are being read. 16.
-    pub scrapes_max: usize,
-    /// How long the text of a scrape answers those that follow. 1 s.
-    pub scrape_kept_s: f64,
-    /// Calls of `grpc.health.v1.Health/Watch`, one a connection. 16.
-    pub health_watches_max: usize,
-    /// How long a health watch lasts that came without a key, seconds. 600.
-    pub health_watch_max_s: f64,
-    /// Watches of maps at once, over both protocols. 256.
-    pub watches_max: usize,
-    /// Watches of one caller at once: of a key, or of an address where there is none; 0 = any number. A quarter of
-    /// `watches_max`, so that nobody has them all. 64.
-    pub caller_watches_max: usize,
-    /// Streams of one caller at once, as `caller_watches_max`. Half of `streams_max`. 128.
-    pub caller_streams_max: usize,
-    /// Longest time between two messages of a watch, where nothing changes. 10 s.
-    pub watch_heartbeat_s: f64,
-    /// How long a watch's client may take no message, until the watch ends. 30 s.
-    pub watch_unread_max_s: f64,
-    /// Events that a map keeps in memory: what became of the last scans, and of the last of each of as many robots.
-    /// 256.
-    pub events_per_map_max: usize,
-    /// Points of one query, deletion or scan, or rays of one question. 2,000,000.
-    pub points_per_request_max: usize,
-    /// How far the time of a scan's point may lie from the scan's timestamp. 2 s.
-    pub point_times_max_s: f64,
-    /// Keys of one deletion. 2,000,000.
-    pub keys_per_request_max: usize,
-    /// Maps at once. 64.
-    pub maps_max: usize,
-    /// Finest voxels of one map. 200,000,000.
-    pub voxels_per_map_max: usize,
-    /// Voxels that one listing may return. 20,000,000.
-    pub listed_voxels_max: usize,
-    /// Links, spheres and points, in all, of a body that is checked, and spheres of a group that is checked as one. A
-    /// body has 65,536 links at most, whatever this is. 16,384.
-    pub body_parts_max: usize,
-    /// Regions in which a check ignores voxels. A message has 4,096 at most, whatever this is. 64.
-    pub ignored_regions_max: usize,
-    /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part
-    /// goes. 128 MiB.
-    pub planning_field_bytes_max: usize,
-    /// How long a question of a planner may take, while changes of the map wait for it. 0.5 s.
-    pub question_time_max_s: f64,
-    /// Time of a question that is answered in parts, seconds: each part takes `question_time_max_s` at most.
-    pub long_question_time_max_s: f64,
-    /// How long a grid that is drawn in tiles may take in all, its client's reading with it. 60 s.
-    pub grid_time_max_s: f64,
-    /// Cells of one 2-D grid that is answered as a whole. 4,000,000.
-    pub grid_cells_max: usize,
-    /// Voxels of a box in which frontiers are looked for. 4,000,000.
-    pub frontier_cells_max: usize,
-    /// Frontiers of one answer. 1,000.
-    pub frontiers_max: usize,
-    /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of another. 16 MiB.
-    pub block_bytes_max: usize,
-    /// Cells of a dense block and as far around it as its distances go. 67,108,864.
-    pub block_cells_max: usize,
-    /// Scans that one list of those that touched a voxel has at most, the newest. 100.
-    pub observers_max: usize,
-    /// How long the journal is looked through for the scans that touched a voxel. 10 s.
-    pub observers_time_max_s: f64,
-    /// Poses of one page of a trajectory, and of one that is asked for without a limit. 5,000.
-    pub trajectory_page_max: usize,
-    /// Keep-outs of one map. 256, which is also the most.
-    pub keep_outs_max: usize,
-    /// Comparisons of points with the sides of keep-outs in one query: points times corners, a shape without corners
-    /// counting as one. 400,000,000, some seconds.
-    pub keep_out_tests_max: usize,
-    /// Corners of a keep-out that is a prism. 64, which is also the most.
-    pub keep_out_corners_max: usize,
-    /// Bytes of memory of a map's viewpoints, by which it knows what is free. Where it is full, those that add least
-    /// go. 64 MiB.
-    pub viewpoint_bytes_max: usize,
-    /// Robots of which one map keeps scans, or ids of scans. 4,096.
-    pub robots_per_map_max: usize,
-    /// Robots with scans in a map that one caller brought in since the map was opened: the holder of a key, or an
-    /// address where there is none; 0 = any number. A quarter of `robots_per_map_max`. 1,024.
-    pub robots_per_caller_max: usize,
-    /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
-    pub jobs_waiting_max: usize,
-    /// Bytes of a map file that is restored, before and after compression. 1 GiB.
-    pub map_file_bytes_max: usize,
-    /// Scans of a map file that is restored, and as many that were taken out again. 20,000,000.
-    pub map_file_scans_max: usize,
-    /// How long a read waits for `min_revision` at most; the caller's deadline may end it sooner. 10 s.
-    pub min_revision_wait_max_s: f64,
-    /// How long aligning a scan may take that is not inserted. 10 s.
-    pub alignment_time_max_s: f64,
-    /// How long aligning and preparing a scan may take that is to be inserted. 30 s.
-    pub insertion_time_max_s: f64,
-    /// How long finding out may take what an undo takes back. 60 s.
-    pub undo_time_max_s: f64,
-    /// How long a search with no guess may take. 60 s.
-    pub localization_time_max_s: f64,
-    /// How long a search for a lost robot may take. 2 s.
-    pub recovery_search_time_max_s: f64,
-    /// Shortest time from one search for a lost robot to the next for the same one. 2 s.
-    pub recovery_search_interval_s: f64,
-    /// Candidates of one search, which keeps that many places. 16.
-    pub localization_candidates_max: usize,
-    /// Memory for the dilated levels of one search; a map that takes more is searched at a coarser resolution, or in
-    /// a box. 512 MiB.
-    pub localization_grid_bytes_max: usize,
-    /// MiB free on the disk of the data folder below which changes are refused; 0 = never. 256.
-    pub disk_free_low_mib: u64,
-    /// MiB free from which on they are taken again. 512.
-    pub disk_free_resume_mib: u64,
-    /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control
-    /// group allows. 0.
-    pub memory_high_mib: u64,
-    /// MiB at which it is taken again; 0 = 94 % of the high mark. 0.
-    pub memory_resume_mib: u64,
-}
+use crate::settings;
 
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            message_bytes_max: Self::MESSAGE_BYTES_MAX,
-            connections_max: 2048,
-            connections_reserved: 128,
-            connection_opening_max_s: 10.0,
-            http_idle_max_s: 30.0,
-            grpc_idle_max_s: 600.0,
-            requests_max: 512,
-            streams_max: 256,
-            body_bytes_max: 1 << 30,
-            body_silence_max_s: 30.0,
-            body_bytes_per_s_min: 1024,
-            caller_requests_per_s_max: 0,
-            caller_burst_max: 100,
-            caller_requests_at_once_max: 192,
-            probes_max: 64,
-            probe_body_bytes_max: 1 << 10,
-            probe_time_max_s: 5.0,
-            scrapes_max: 16,
-            scrape_kept_s: 1.0,
-            health_watches_max: 16,
-            health_watch_max_s: 600.0,
-            watches_max: 256,
-            caller_watches_max: 64,
-            caller_streams_max: 128,
-            watch_heartbeat_s: 10.0,
-            watch_unread_max_s: 30.0,
-            events_per_map_max: 256,
-            points_per_request_max: 2_000_000,
-            point_times_max_s: 2.0,
-            keys_per_request_max: 2_000_000,
-            maps_max: 64,
-            voxels_per_map_max: 200_000_000,
-            listed_voxels_max: 20_000_000,
-            body_parts_max: 16_384,
-            ignored_regions_max: 64,
-            planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
-            question_time_max_s: 0.5,
-            long_question_time_max_s: 10.0,
-            grid_time_max_s: 60.0,
-            grid_cells_max: 4_000_000,
-            frontier_cells_max: 4_000_000,
-            frontiers_max: 1000,
-            block_bytes_max: 16 << 20,
-            block_cells_max: 64 << 20,
-            observers_max: 100,
-            observers_time_max_s: 10.0,
-            trajectory_page_max: 5_000,
-            keep_outs_max: KEEP_OUTS_MAX,
-            keep_out_tests_max: 400_000_000,
-            keep_out_corners_max: PRISM_CORNERS_MAX,
-            viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
-            robots_per_map_max: 4_096,
-            robots_per_caller_max: 1_024,
-            jobs_waiting_max: 256,
-            map_file_bytes_max: 1 << 30,
-            map_file_scans_max: 20_000_000,
-            min_revision_wait_max_s: 10.0,
-            alignment_time_max_s: 10.0,
-            insertion_time_max_s: 30.0,
-            undo_time_max_s: 60.0,
-            localization_time_max_s: 60.0,
-            recovery_search_time_max_s: 2.0,
-            recovery_search_interval_s: 2.0,
-            localization_candidates_max: 16,
-            localization_grid_bytes_max: 512 << 20,
-            disk_free_low_mib: 256,
-            disk_free_resume_mib: 512,
-            memory_high_mib: 0,
-            memory_resume_mib: 0,
-        }
+settings! {
+    /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is
+    /// named in the error of a request beyond it.
+    pub struct Limits in "limits" {
+        /// Bytes of one HTTP body or one gRPC message.
+        message_bytes_max: usize = Self::MESSAGE_BYTES_MAX; bytes, from 1;
+        /// Points of a query, deletion or scan, or rays of one question.
+        points_per_request_max: usize = 2_000_000; none;
+        /// How far the time of a scan's point may lie from the scan's `timestamp_ns`.
+        point_times_max_s: f64 = 2.0; s, from 0, to DAY_S;
+        /// Keys of a deletion.
+        keys_per_request_max: usize = 2_000_000; none;
+        /// Voxels of one listing.
+        listed_voxels_max: usize = 20_000_000; none;
+        /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of a sparse one. Less
+        /// where `message_bytes_max` is less than 1 KiB more.
+        block_bytes_max: usize = 16 << 20; bytes;
+        /// Cells of a dense block and of what lies around it within its cap.
+        block_cells_max: usize = 64 << 20; none;
+        /// Links, spheres and points, in all, of a body that is checked, and spheres of a group of `CheckSpheres`. A
+        /// body has 65,536 links at most, whatever this is.
+        body_parts_max: usize = 16_384; none;
+        /// Distance fields that a map keeps for checks of bodies, 12 to 30 bytes a voxel near which checks were asked.
+        /// Beyond, the oldest part goes and is computed anew where it is asked for: slower, and as exact.
+        planning_field_bytes_max: usize = FIELD_BYTES_MAX_DEFAULT; bytes;
+        /// Time of a planner's question, or of a part of one that is answered in parts, while changes of the map wait
+        /// for it.
+        question_time_max_s: f64 = 0.5; s, from 0, to DAY_S;
+        /// Time of all parts of a question that is answered in parts: a classification of points, 262,144 at a time.
+        /// Between them changes are made and callers take turns.
+        long_question_time_max_s: f64 = 10.0; s, from 0, to DAY_S;
+        /// Cells of one 2-D grid that is answered as a whole.
+        grid_cells_max: usize = 4_000_000; none;
+        /// Time of a 2-D grid that comes in tiles, the client's reading with it. Each tile has `question_time_max_s` of
+        /// its own.
+        grid_time_max_s: f64 = 60.0; s, from 0, to DAY_S;
+        /// Voxels of a box in which frontiers are looked for.
+        frontier_cells_max: usize = 4_000_000; none;
+        /// Frontiers of one answer.
+        frontiers_max: usize = 1000; none;
+        /// Scans that one list of those that touched a voxel has at most, the newest.
+        observers_max: usize = 100; none;
+        /// Reading the journal for such a list. What is not read by then is said to be older.
+        observers_time_max_s: f64 = 10.0; s, from 0, to DAY_S;
+        /// Poses of one page of a trajectory, and of one that is asked for without a limit.
+        trajectory_page_max: usize = 5_000; none, from 1, to MANY;
+        /// Maps at once.
+        maps_max: usize = 64; none;
+        /// Finest voxels of a map.
+        voxels_per_map_max: usize = 200_000_000; none;
+        /// Memory of a map's viewpoints, by which it knows what is free. Where it is full, those that add least go.
+        viewpoint_bytes_max: usize = VIEWPOINT_BYTES_MAX_DEFAULT; bytes;
+        /// Robots with scans, or ids of scans, in a map. A name whose scans were all undone is free again.
+        robots_per_map_max: usize = 4_096; none, from 1, to MANY;
+        /// Robots with scans in a map that one key, or one address where there is no key, brought in since the server
+        /// opened the map, so that nobody takes all names. 0 = any number.
+        robots_per_caller_max: usize = 1_024; none, from 0, to MANY;
+        /// A map file, taken or restored, before and after compression.
+        map_file_bytes_max: usize = 1 << 30; bytes;
+        /// Requests in work, and as many whose bodies arrive. Three quarters of them may wait for maps that are being
+        /// opened, half of those for one map; of either, one caller may have half. A map whose files have been read for
+        /// 5 s keeps nobody waiting: `catalog_busy`.
+        requests_max: usize = 512; none, from 1, to MANY;
+        /// Calls whose client streams messages.
+        streams_max: usize = 256; none, from 1, to MANY;
+        /// Watches of maps, over both protocols.
+        watches_max: usize = 256; none, from 0, to MANY;
+        /// Longest time between two messages of a watch, where nothing changes.
+        watch_heartbeat_s: f64 = 10.0; s, from 0.01, to DAY_S;
+        /// A watch ends whose client takes no message for so long.
+        watch_unread_max_s: f64 = 30.0; s, from 0, to DAY_S;
+        /// Events that a map keeps in memory: what became of the last scans, and of the last of each of as many robots.
+        events_per_map_max: usize = 256; none, from 0, to 4096;
+        /// Jobs of a lane that wait for a thread; and, counted apart, callers that wait for the turn of their robot or
+        /// of an undo, of which one caller may be as many as places are left.
+        jobs_waiting_max: usize = 256; none, from 0, to MANY;
+        /// All bodies that have arrived, the last body of a robot that each stream of checks keeps, and answers,
+        /// listings and map files on their way out. JSON, and heads of the form for programs, count six times. At least
+        /// `message_bytes_max`.
+        body_bytes_max: usize = 1 << 30; bytes;
+        /// Silence in the middle of a body.
+        body_silence_max_s: f64 = 30.0; s, from 0, to DAY_S;
+        /// Bytes a second: a slower body counts as silent. 0 = any byte will do.
+        body_bytes_per_s_min: u32 = 1024; bytes;
+        /// Requests and messages of streams a second of one key, or of one address where there is no key. 0 = any
+        /// number.
+        caller_requests_per_s_max: u32 = 0; none;
+        /// As many may come at once.
+        caller_burst_max: u32 = 100; none;
+        /// Requests and streams in work at a time of one key that says nothing of that itself, so that no key keeps
+        /// others out. 0 = any number.
+        caller_requests_at_once_max: u32 = 192; none;
+        /// Watches of one key, or of one address where there is no key, so that nobody has all `watches_max`. 0 = any
+        /// number. Raise it where many come by one address, as through a proxy.
+        caller_watches_max: usize = 64; none, from 0, to MANY;
+        /// The same of streams, of `streams_max`.
+        caller_streams_max: usize = 128; none, from 0, to MANY;
+        /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle,
+        /// it gives way. More than twice `requests_max`, and `streams_max` and `watches_max` besides.
+        connections_max: usize = 2048; none;
+        /// An HTTP connection without a request, or one request's headers.
+        http_idle_max_s: f64 = 30.0; s, from 0, to DAY_S;
+        /// A gRPC connection without a call.
+        grpc_idle_max_s: f64 = 600.0; s, from 0, to DAY_S;
+        /// Waiting for `min_revision`. The call's own deadline may end it sooner.
+        min_revision_wait_max_s: f64 = 10.0; s, from 0, to DAY_S;
+        /// Aligning a scan that is not inserted. This and the next two count from when a thread begins with the work.
+        alignment_time_max_s: f64 = 10.0; s, from 0, to DAY_S;
+        /// Aligning and preparing a scan that is inserted.
+        insertion_time_max_s: f64 = 30.0; s, from 0, to DAY_S;
+        /// Finding out what an undo takes back.
+        undo_time_max_s: f64 = 60.0; s, from 0, to DAY_S;
+        /// A search with no guess.
+        localization_time_max_s: f64 = 60.0; s, from 0, to DAY_S;
+        /// Candidates of a search, which keeps that many places.
+        localization_candidates_max: usize = 16; none;
+        /// Memory of a search. A map that needs more is searched at a coarser resolution, and refused
+        /// (`search_too_large`) where the coarsest needs more too.
+        localization_grid_bytes_max: usize = 512 << 20; bytes;
+        /// A search for a lost robot.
+        recovery_search_time_max_s: f64 = 2.0; s, from 0, to DAY_S;
+        /// Free disk of the data folder below which changes are refused. 0 = never.
+        disk_free_low_mib: u64 = 256; MiB, from 0, to MIB_MAX;
+        /// Free disk from which on they are taken again.
+        disk_free_resume_mib: u64 = 512; MiB, from 0, to MIB_MAX;
+        /// Memory in use above which what makes maps grow is refused. 0 = 85 % of what the system or the control group
+        /// allows.
+        memory_high_mib: u64 = 0; MiB, from 0, to MIB_MAX;
+        /// Memory in use at which it is taken again. 0 = 94 % of the high mark.
+        memory_resume_mib: u64 = 0; MiB, from 0, to MIB_MAX;
+    } constants {
+        /// Connections of each protocol besides `connections_max`, where all of those are in use: for one health check
+        /// each, and for `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives
+        /// way, or one of the peer that has most.
+        connections_reserved: usize = 128;
+        /// Seconds until a connection has to be secure and to begin to speak.
+        connection_opening_max_s: f64 = 10.0;
+        /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are
+        /// taken, the oldest gives way.
+        probes_max: usize = 64;
+        /// Bytes of the body of a health check, which comes as it is: nothing is inflated.
+        probe_body_bytes_max: usize = 1 << 10;
+        /// Seconds that the body of a health check may take.
+        probe_time_max_s: f64 = 5.0;
+        /// Scrapes of the metrics that wait or are being read.
+        scrapes_max: usize = 16;
+        /// Seconds for which the text of a scrape answers those that follow.
+        scrape_kept_s: f64 = 1.0;
+        /// Calls of `grpc.health.v1.Health/Watch`, one a connection.
+        health_watches_max: usize = 16;
+        /// Seconds that a health watch lasts that came without a key.
+        health_watch_max_s: f64 = 600.0;
+        /// Keep-outs of a map.
+        keep_outs_max: usize = KEEP_OUTS_MAX;
+        /// Corners of a keep-out that is a prism.
+        keep_out_corners_max: usize = PRISM_CORNERS_MAX;
+        /// Comparisons of points with the sides of keep-outs in one query: points times corners, a shape without
+        /// corners counting as one. Some seconds.
+        keep_out_tests_max: usize = 400_000_000;
+        /// Regions in which a check ignores voxels. A message has 4,096 at most.
+        ignored_regions_max: usize = 64;
+        /// Scans of a map file that is restored, and as many that were taken out again.
+        map_file_scans_max: usize = 20_000_000;
+        /// Seconds from one search for a lost robot to the next for the same one, at least.
+        recovery_search_interval_s: f64 = 2.0;
     }
 }
+
+/// The longest time, seconds.
+const DAY_S: f64 = 86_400.0;
+/// The largest number of things at once.
+const MANY: u32 = 1 << 20;
+/// The largest number of MiB: more than any system has.
+const MIB_MAX: f64 = (1u64 << 40) as f64;
 
 impl Limits {
     /// Bytes of one message where nothing is set.

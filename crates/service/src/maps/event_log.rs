@@ -10,9 +10,6 @@ use mrol_map::map::RobotName;
 use mrol_map::sync::{Mutex, Rank};
 use mrol_map::util::unix_time_ns;
 
-/// The most events of a map that the server can be set to keep.
-pub const EVENTS_MAX: usize = 4096;
-
 /// The last events of a map, and the last of each robot: a robot that fell silent is still there to be seen.
 ///
 /// Bounded by the number of events: for a new one, the oldest goes of the robot that has most, so that no robot crowds

@@ -25,7 +25,6 @@ mod start;
 
 pub(crate) use built_map::BuiltMap;
 pub(crate) use catalog::Catalog;
-pub use event_log::EVENTS_MAX;
 pub(crate) use full_state::FullState;
 pub(crate) use hosted_map::{HostedMap, RATE_SAMPLES};
 pub(crate) use opening::maps_at_once;
