@@ -81,12 +81,16 @@ impl PoseCovariance {
         Ok(Self(matrix))
     }
 
-    /// That of a pose which may be off by these standard deviations in every direction and about every axis, at most by
-    /// those of a pose of which nothing is known.
+    /// That of a pose which may be off by these standard deviations in every direction and about every axis: in place
+    /// and tilt at most by those of a pose of which nothing is known. A robot may have turned all the way around.
     pub fn isotropic(std_m: f64, std_rad: f64) -> Self {
-        let (meters, radians) =
-            (std_m.clamp(0.0, WIDE_M).powi(2), std_rad.clamp(0.0, WIDE_DEG.to_radians()).powi(2));
-        Self(Matrix6::from_diagonal(&Vector6::new(meters, meters, meters, radians, radians, radians)))
+        let (meters, tilt, yaw) = (
+            std_m.clamp(0.0, WIDE_M),
+            std_rad.clamp(0.0, WIDE_DEG.to_radians()),
+            std_rad.clamp(0.0, OPEN_RAD),
+        );
+        let deviations = Vector6::new(meters, meters, meters, tilt, tilt, yaw);
+        Self(Matrix6::from_diagonal(&deviations.component_mul(&deviations)))
     }
 
     /// That of a guess of which nothing else is known.
@@ -170,6 +174,11 @@ impl PosePrior {
         let variance = self.spread().0[(5, 5)];
         let is_told = self.covariance.is_some() || self.expected.is_some();
         3.0 * variance.sqrt() >= YAW_OPEN_DEG.to_radians() && (is_told || self.may_have_turned)
+    }
+
+    /// True where the robot may have turned, and nothing tells how far: neither odometry, nor a time, nor a covariance.
+    pub(super) fn tells_no_turn(&self) -> bool {
+        self.may_have_turned && self.covariance.is_none() && self.expected.is_none()
     }
 
     /// Three standard deviations along a direction (of length 1, map frame), meters.

@@ -52,8 +52,8 @@ impl Contest<'_> {
         if others.is_empty() || self.settings.multi_start.ascents == 0 {
             return Alignment { wants_more_starts: !others.is_empty(), ..self.judged(&mut ends) };
         }
-        // What odometry tells of the turn is heard where rays contradict both sides, too.
-        if prior.leaves_yaw_open() {
+        // What is told of the turn is heard where rays contradict both sides, too.
+        if prior.tells_no_turn() {
             ends.open_yaw();
         }
         for (guess, coarsest) in others {

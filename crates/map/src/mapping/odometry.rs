@@ -59,8 +59,8 @@ impl OdometrySettings {
         PoseCovariance::isotropic(way_m, self.turn_share * motion.rotation.angle())
     }
 
-    /// How far from where it was a robot may be after so many seconds.
-    pub(super) fn after(&self, seconds: f64) -> PoseCovariance {
+    /// How far from where it was a robot may be after so many seconds without odometry.
+    pub fn after(&self, seconds: f64) -> PoseCovariance {
         let turn_rad = self.turn_max_deg_per_s.to_radians() * seconds / 3.0;
         PoseCovariance::isotropic(self.speed_max_m_per_s * seconds / 3.0, turn_rad)
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::set_option::SetOption;
 use crate::experiment::verdicts::{
-    Carved, GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, RoomTrials, Set, aisle, random, rooms,
+    Carved, GUESSES, MapOf, Outcomes, PEOPLE, PERIODS_M, PIECES, STEP_S, Set, TURN_S, aisle, random, rooms,
 };
 use mrol::console::error::CliError;
 use mrol::console::output::Output;
@@ -18,12 +18,13 @@ EXAMPLES:
   mrol-lab experiment verdicts                                     simulated places alone
   mrol-lab experiment verdicts hall/:0.1:hall street/:0.2:street   and two sets of real scans
 
-Each argument is a folder of scans with poses.txt (a TUM file, line k for scan k), the side of a voxel, and the name of the
-place. Its scans are aligned to maps of one, two and half of them, from guesses 0.1 m and 3 degrees to 8 m and 180 degrees off;
-scans of other places too. Simulated: rectangular rooms with 1 to 8 pieces of furniture and up to 12 people, after an unseen turn by as
-much as looks the same (one scan, up to three, and one after a piece was moved), and after a step; aisles with an upright every 0.5 to 3 m, by odometry and from the pose before. A pose is right within two voxels and two
-degrees. Then how rays agree at true poses and at wrong ones, 8 voxels and 10 degrees off, and how many of each a threshold from the other
-sets would tell.";
+Each argument is a folder of scans with poses.txt (a TUM file, line k for scan k), the side of a voxel, and the name
+of the place. Its scans are aligned to maps of one, two and half of them, from guesses 0.1 m and 3 degrees to 8 m and
+180 degrees off; scans of other places too. Simulated: rectangular rooms with 1 to 8 pieces of furniture and up to 12
+people, after an unseen turn by as much as looks the same (one scan, up to three, and one after a piece was moved),
+and after a step, with times of the scans and without; aisles with an upright every 0.5 to 3 m, by odometry and from
+the pose before. A pose is right within two voxels and two degrees. Then how rays agree at true poses and at wrong
+ones, 8 voxels and 10 degrees off, and how many of each a threshold from the other sets would tell.";
 
 /// Wrong poses that are accepted and right ones that are refused, on real sets and in simulated places
 #[derive(Debug, clap::Args)]
@@ -113,21 +114,25 @@ impl Verdicts {
     fn simulated(&self, settings: &AlignmentSettings, bar: &Output) -> Result<(), CliError> {
         for pieces in PIECES {
             for people in PEOPLE {
-                let RoomTrials { turned, by_third, rearranged, stepped, carved, hidden } =
-                    rooms(self.seed, self.rooms, pieces, people, settings).ok_or_else(no_map)?;
+                let trials = rooms(self.seed, self.rooms, pieces, people, settings).ok_or_else(no_map)?;
                 bar.step();
-                let hidden = 100.0 * hidden;
+                let hidden = 100.0 * trials.hidden;
                 let of_room =
                     format!("room, {pieces} pieces, {people} people ({hidden:.0} % of the view at most)");
                 for (what, outcomes) in [
-                    ("turned", turned),
-                    ("turned, by the third scan", by_third),
-                    ("turned, a piece moved since", rearranged),
-                    ("a step", stepped),
+                    ("turned".into(), trials.turned),
+                    (format!("turned within {TURN_S} s"), trials.turned_in_time),
+                    ("turned, by the third scan".into(), trials.by_third),
+                    ("turned, a piece moved since".into(), trials.rearranged),
+                    ("a step".into(), trials.stepped),
+                    (format!("a step within {STEP_S} s"), trials.stepped_in_time),
                 ] {
                     bar.print(&Line::of(format!("{of_room}, {what}"), outcomes))?;
                 }
-                bar.print(&CarvedLine { what: format!("{of_room}, carved of what stands"), carved })?;
+                bar.print(&CarvedLine {
+                    what: format!("{of_room}, carved of what stands"),
+                    carved: trials.carved,
+                })?;
             }
         }
         for period_m in PERIODS_M {

@@ -14,7 +14,7 @@ mod trial;
 
 pub use aisles::{PERIODS_M, aisle};
 pub use outcomes::Outcomes;
-pub use rooms::{Carved, PEOPLE, PIECES, RoomTrials, rooms};
+pub use rooms::{Carved, PEOPLE, PIECES, RoomTrials, STEP_S, TURN_S, rooms};
 pub use searches::{KindOfSearch, Searches};
 pub use sets::{GUESSES, MapOf, Set, Trials};
 pub use trial::random;

@@ -6,10 +6,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::outcomes::{Outcomes, is_right};
 use super::trial::{SIMULATED_M, aligned, carved, lidar, mapped, on_floor, seen};
-use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
+use mrol_map::align::{Alignment, AlignmentSettings, PosePrior, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MultiResolutionMap;
-use mrol_map::mapping::ViewpointSettings;
+use mrol_map::mapping::{OdometrySettings, ViewpointSettings};
 use mrol_simulate::Scene;
 
 /// Pieces of furniture in rectangular rooms.
@@ -22,6 +22,10 @@ const SCANS_AFTER: u32 = 3;
 const RANGE_M: f64 = 30.0;
 /// The turn of a robot that goes on, degrees.
 const STEP_DEG: f64 = 8.0;
+/// The time that a step takes, where it is told, seconds.
+pub const STEP_S: f64 = 0.5;
+/// The time that a turn of half a circle takes, where it is told, seconds.
+pub const TURN_S: f64 = 2.0;
 
 /// What came of scans in rooms.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +38,10 @@ pub struct RoomTrials {
     pub rearranged: Outcomes,
     /// Of a scan after a step.
     pub stepped: Outcomes,
+    /// Of the same, where times tell that [`STEP_S`] went by.
+    pub stepped_in_time: Outcomes,
+    /// Of the first scan after a turn, where times tell that [`TURN_S`] went by.
+    pub turned_in_time: Outcomes,
     /// Voxels that the accepted ones of the scans in rooms that nobody changed took out of the map, where they were
     /// found and where they were taken: all of them stand.
     pub carved: Carved,
@@ -107,12 +115,17 @@ pub fn rooms(
             let found = aligned(&map, &points, &last.into(), settings);
             (points, found)
         };
+        let tried_in_time = |points: &[Point], seconds: f64| {
+            let expected = Some(OdometrySettings::default().after(seconds));
+            aligned(&map, points, &PosePrior { expected, ..last.into() }, settings)
+        };
         trials.hidden =
             trials.hidden.max(hidden(&scene, &scene.with_people(crowd, people, [0.0, 0.0]), &last));
 
         let truth = after(turn_deg);
         let (mut points, mut found) = tried(&scene, &truth);
         trials.turned.add(&found, Some(&truth), SIMULATED_M);
+        trials.turned_in_time.add(&tried_in_time(&points, TURN_S), Some(&truth), SIMULATED_M);
         let mut at = truth;
         for scan in 1..SCANS_AFTER {
             if found.0.verdict == Verdict::Accepted {
@@ -128,6 +141,7 @@ pub fn rooms(
         let truth = after(STEP_DEG);
         let (points, found) = tried(&scene, &truth);
         trials.stepped.add(&found, Some(&truth), SIMULATED_M);
+        trials.stepped_in_time.add(&tried_in_time(&points, STEP_S), Some(&truth), SIMULATED_M);
         trials.carved.add(&map, &points, &found.0, &truth)?;
     }
     Some(trials)
@@ -156,16 +170,18 @@ mod tests {
     #[test]
     fn a_robot_that_was_turned_unseen_in_a_rectangular_room_is_not_believed_where_it_is_not() {
         let settings = AlignmentSettings::default();
-        let (mut turned, mut stepped) = <(Outcomes, Outcomes)>::default();
+        let (mut turned, mut stepped, mut in_time) = <(Outcomes, Outcomes, Outcomes)>::default();
         for (pieces, people) in
             [2, 4, 8].into_iter().flat_map(|pieces| [0, 2, 5].map(|people| (pieces, people)))
         {
             let trials = rooms(70_001, 2, pieces, people, &settings).unwrap();
             turned.append(trials.turned);
             turned.append(trials.by_third);
+            turned.append(trials.turned_in_time);
             stepped.append(trials.stepped);
+            in_time.append(trials.stepped_in_time);
         }
-        for outcomes in [turned, stepped] {
+        for outcomes in [turned, stepped, in_time] {
             assert!(outcomes.wrong.is_empty(), "{:?}", outcomes.wrong);
             let (right, alignments) = (outcomes.right, outcomes.alignments());
             assert!(right * 4 >= alignments * 3, "{right} of {alignments} are found");
