@@ -40,6 +40,9 @@ impl Settings {
             Action::Schema => return output.object(&Config::schema()),
         };
         let config = options.config().map_err(CliError::usage)?;
+        for constant in &config.constants_set {
+            output.note(format!("{constant} is a constant, and what is set of it does not count"));
+        }
         if output.is_json() {
             return output.object(&config);
         }

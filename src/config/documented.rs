@@ -45,14 +45,15 @@ impl Config {
             let of = |all: &Value| if section.is_empty() { all.clone() } else { all[section].clone() };
             write_section(&mut text, section, &rows, &of(&values), &of(&defaults));
         }
+        text.push_str("\n# Settings by robot; \"*\" stands for every robot without a section of its own.\n");
         let default = json!(RobotConfig::default());
         for (name, robot) in &self.robots {
-            let section = format!("robots.{}", Value::from(name.as_str()));
+            let section = format!("robots.{}", quoted(name));
             write_section(&mut text, &section, &RobotConfig::settings(), &json!(robot), &default);
         }
         if self.robots.is_empty() {
             let mut example = String::new();
-            let section = format!("robots.{}", Value::from(EVERY_ROBOT));
+            let section = format!("robots.{}", quoted(EVERY_ROBOT));
             write_section(&mut example, &section, &RobotConfig::settings(), &default, &default);
             let lines = example.lines().map(|line| match line {
                 "" => "\n".to_owned(),
@@ -74,6 +75,11 @@ impl Config {
             } else {
                 properties.insert(section.into(), object_of(&rows, &defaults[section]));
             }
+        }
+        for (row, _) in Limits::constants() {
+            let mut schema = schema_of(&row);
+            schema["deprecated"] = true.into();
+            properties["limits"]["properties"][row.name] = schema;
         }
         let robot = object_of(&RobotConfig::settings(), &json!(RobotConfig::default()));
         properties.insert("robots".into(), json!({"type": "object", "additionalProperties": robot}));
@@ -107,6 +113,11 @@ fn write_section(text: &mut String, section: &str, rows: &[Setting], values: &Va
     }
 }
 
+/// A name as TOML quotes it.
+fn quoted(name: &str) -> String {
+    Value::from(name).to_string().replace('\u{7f}', "\\u007F")
+}
+
 /// A value as TOML writes it; none of no value.
 fn in_toml(value: &Value) -> Option<String> {
     toml::Value::try_from(value).ok().map(|value| value.to_string())
@@ -129,7 +140,8 @@ fn wrapped(words: &str) -> Vec<String> {
 /// The default of a setting, with its unit.
 fn default_of(row: &Setting, value: &Value) -> String {
     match value {
-        Value::Null => "none".into(),
+        Value::Null if row.unit == Unit::none => "none".into(),
+        Value::Null => format!("none (in {})", row.unit.as_str()),
         Value::Array(values) if values.is_empty() => "none".into(),
         Value::String(text) => format!("`{text}`"),
         Value::Number(number) => {
@@ -169,28 +181,35 @@ fn object_of(rows: &[Setting], defaults: &Value) -> Value {
 
 fn properties_of(rows: &[Setting], defaults: &Value) -> Map<String, Value> {
     let of_row = |row: &Setting| {
-        let kind = match row.kind {
-            SettingKind::Boolean => "boolean",
-            SettingKind::Integer => "integer",
-            SettingKind::Number => "number",
-            SettingKind::Text => "string",
-            SettingKind::List => "array",
-        };
-        let mut schema = json!({"type": kind, "description": row.sentence});
-        let default = Some(&defaults[row.name]).filter(|default| !default.is_null());
-        let facts = [
-            ("default", default.cloned()),
-            ("minimum", row.least.map(Value::from)),
-            ("maximum", row.most.map(Value::from)),
-        ];
-        for (name, value) in facts {
-            if let Some(value) = value {
-                schema[name] = value;
-            }
+        let mut schema = schema_of(row);
+        if !defaults[row.name].is_null() {
+            schema["default"] = defaults[row.name].clone();
         }
         (row.name.to_owned(), schema)
     };
     rows.iter().map(of_row).collect()
+}
+
+/// The schema of a setting.
+fn schema_of(row: &Setting) -> Value {
+    let numbers = json!({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3});
+    let mut schema = match row.kind {
+        SettingKind::Boolean => json!({"type": "boolean"}),
+        SettingKind::Integer => json!({"type": "integer"}),
+        SettingKind::Number => json!({"type": "number"}),
+        SettingKind::Text if row.words.is_empty() => json!({"type": "string"}),
+        SettingKind::Text => json!({"enum": row.words}),
+        SettingKind::Texts => json!({"type": "array", "items": {"type": "string"}}),
+        SettingKind::Corners => json!({"type": "array", "items": numbers, "minItems": 2, "maxItems": 2}),
+    };
+    schema["description"] = row.sentence.clone().into();
+    let (least, most) = row.bounds();
+    for (name, bound) in [("minimum", least), ("maximum", most)] {
+        if let Some(bound) = bound {
+            schema[name] = bound.into();
+        }
+    }
+    schema
 }
 
 #[cfg(test)]
@@ -247,12 +266,17 @@ mod tests {
         }
         tables.push_str(&table("robots.NAME", &RobotConfig::settings(), &json!(RobotConfig::default())));
         check_guide("settings", &tables);
+        let mut constants = "| constant | value | meaning |\n|---|---|---|\n".to_owned();
+        for (row, value) in Limits::constants() {
+            writeln!(constants, "| `{}` | {value} | {} |", row.name, row.sentence).unwrap();
+        }
+        check_guide("constants", &constants);
     }
 
     #[test]
     fn a_printed_file_has_every_setting_and_is_read_as_what_it_was() {
-        let robots =
-            [(EVERY_ROBOT.to_owned(), RobotConfig { range_max_m: Some(30.0), ..RobotConfig::default() })];
+        let robot = RobotConfig { range_max_m: Some(30.0), ..RobotConfig::default() };
+        let robots = [EVERY_ROBOT, "del\u{7f}", "a.b \"c\"\n'"].map(|name| (name.to_owned(), robot.clone()));
         let mut config = Config { robots: robots.into(), ..Config::default() };
         config.access.hosts = vec!["mrol".into()];
         let printed = config.to_toml();
@@ -283,5 +307,8 @@ mod tests {
         assert_eq!((&limit["minimum"], &limit["maximum"]), (&json!(1.0), &json!(1_048_576.0)));
         let robot = &schema["properties"]["robots"]["additionalProperties"]["properties"]["range_max_m"];
         assert_eq!(robot["type"], "number");
+        // A file that sets what is a constant now is read.
+        assert_eq!(schema["properties"]["limits"]["properties"]["probes_max"]["deprecated"], true);
+        assert_eq!(schema["properties"]["log"]["properties"]["format"]["enum"], json!(["text", "json"]));
     }
 }

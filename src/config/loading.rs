@@ -115,6 +115,24 @@ mod tests {
     }
 
     #[test]
+    fn what_became_a_constant_is_read_told_and_does_not_count() {
+        let config = load("[limits]\nprobes_max = 5\nmaps_max = 3", json!({})).unwrap();
+        assert_eq!(config.constants_set, ["limits.probes_max"]);
+        assert_eq!(config.limits, Limits { maps_max: 3, ..Limits::default() });
+    }
+
+    #[test]
+    fn whole_numbers_are_read_as_what_they_are_in_every_language() {
+        let most = |value: u64| load(&format!("[store]\nundo_bytes_max = {value}"), json!({}));
+        assert_eq!(most(1 << 53).unwrap().store.undo_bytes_max, 1 << 53);
+        let error = most((1 << 53) + 2).unwrap_err().to_string();
+        assert!(
+            error.contains("store.undo_bytes_max must be 0 to 9007199254740992, got 9007199254740994"),
+            "{error}"
+        );
+    }
+
+    #[test]
     fn values_that_do_not_fit_are_named() {
         let error = |toml| load(toml, json!({})).unwrap_err().to_string();
         let journal = error("[store]\nsnapshot_journal_mib = 0");

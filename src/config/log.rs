@@ -18,4 +18,8 @@ settings! {
 
 impl SettingValue for LogFormat {
     const KIND: SettingKind = SettingKind::Text;
+
+    fn words() -> Vec<&'static str> {
+        vec!["text", "json"]
+    }
 }

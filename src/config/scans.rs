@@ -4,6 +4,7 @@ use crate::json::ByKeyword;
 use mrol_map::align::Method;
 use mrol_map::mapping::{CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings};
 use mrol_map::scan::PointFilter;
+use mrol_map::util::Keyword;
 use mrol_service::{RobotSettings, SettingKind, SettingValue, settings};
 
 settings! {
@@ -17,12 +18,12 @@ settings! {
 settings! {
     /// Settings of a robot's scans; a request may override each value.
     pub struct RobotConfig in "robots.NAME" {
-        /// Nearer points are skipped.
-        range_min_m: Option<f64> = None; m;
-        /// Farther points are skipped.
-        range_max_m: Option<f64> = None; m;
+        /// Points nearer to the sensor are skipped.
+        range_min_m: Option<f64> = None; m, from 0;
+        /// Points farther from the sensor are skipped.
+        range_max_m: Option<f64> = None; m, from 0;
         /// Points at this distance and farther mean "no return": nothing was met up to here. They are skipped.
-        no_return_m: Option<f64> = None; m;
+        no_return_m: Option<f64> = None; m, from 0;
         /// Box of the robot's own body in the sensor frame: smallest and largest corner. Points within it are skipped.
         body_m: Option<[[f64; 3]; 2]> = None; m;
         /// Points at exactly `0 0 0` count as any other. Otherwise they are skipped, since most drivers write them
@@ -39,8 +40,8 @@ settings! {
         /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken
         /// out.
         carve_grazing_deg: f64 = CarvingSettings::default().grazing_deg; deg, from 1, to 80;
-        /// Voxels farther from the sensor than this are not taken out.
-        carve_range_max_m: f64 = CarvingSettings::default().range_max_m; m, to 200;
+        /// Voxels farther from the sensor than this are not taken out. More than 0.
+        carve_range_max_m: f64 = CarvingSettings::default().range_max_m; m, from 0, to 200;
         /// Standard deviation of the length of a `motion` that comes without a covariance, as a share of it.
         odometry_way_share: f64 = OdometrySettings::default().way_share; none, from 0, to ODOMETRY_SHARE_MAX;
         /// Standard deviation of its turn, as a share of it.
@@ -48,8 +49,12 @@ settings! {
     }
 }
 
-impl<T> SettingValue for ByKeyword<T> {
+impl<T: Keyword> SettingValue for ByKeyword<T> {
     const KIND: SettingKind = SettingKind::Text;
+
+    fn words() -> Vec<&'static str> {
+        T::ALL.iter().map(|word| word.as_str()).collect()
+    }
 }
 
 impl RobotConfig {

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::mapping::StationarySettings;
-use mrol_service::{Limits, OutOfRange, ServiceSettings, Setting, SettingKind, Unit};
+use mrol_service::{Limits, OutOfRange, ServiceSettings, Setting, SettingKind, SettingValue, Unit};
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: f64 = 3600.0;
@@ -33,7 +33,7 @@ pub(super) const MANY: u32 = 1 << 20;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Where maps are kept across restarts; an empty path keeps them in memory only. `./mrol-data`.
+    /// Where maps are kept across restarts; an empty path, `\"\"`, keeps them in memory only. `./mrol-data`.
     pub data_dir: PathBuf,
     /// Settings of the store.
     pub store: StoreConfig,
@@ -120,10 +120,10 @@ impl Config {
 
     /// The first value that is out of the range of its row.
     fn out_of_range(&self) -> Option<OutOfRange> {
-        let [_, _, delay] = Self::top();
-        let seconds = f64::from(u32::try_from(self.drain_delay_s).unwrap_or(u32::MAX));
+        let [_, drain, delay] = Self::top();
         let of_section = [
-            delay.out_of_range("drain_delay_s", seconds),
+            self.drain_seconds.number().and_then(|number| drain.out_of_range("drain_seconds", number)),
+            self.drain_delay_s.number().and_then(|number| delay.out_of_range("drain_delay_s", number)),
             self.store.out_of_range(),
             self.maps.out_of_range(),
             self.access.out_of_range(),
@@ -143,6 +143,7 @@ impl Config {
             unit,
             least: most.map(|_| 0.0),
             most,
+            words: Vec::new(),
             sentence: sentence.into(),
         };
         [
@@ -151,7 +152,7 @@ impl Config {
                 SettingKind::Text,
                 Unit::none,
                 None,
-                "Where maps are kept across restarts; an empty path keeps them in memory only.",
+                "Where maps are kept across restarts; an empty path, `\"\"`, keeps them in memory only.",
             ),
             row(
                 "drain_seconds",

@@ -19,9 +19,9 @@ settings! {
         /// Revisions behind the newest within which scans can be undone, unless `undo_bytes_max` or a full disk ends it
         /// sooner.
         undo_revisions: u64 = StoreSettings::default().undo_revisions; none;
-        /// Snapshots and journal of a map that are kept for undo alone.
+        /// Most bytes of snapshots and journal of a map that are kept for undo alone.
         undo_bytes_max: u64 = StoreSettings::default().undo_bytes_max; bytes;
-        /// A map's last changes that are kept in memory for those who watch it.
+        /// Most bytes of a map's last changes that are kept in memory for those who watch it.
         watch_bytes_max: usize = StoreSettings::default().watch_bytes_max; bytes;
         /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
         /// execution.

@@ -2,6 +2,8 @@
 
 use serde_json::Value;
 
+use mrol_service::Limits;
+
 use super::error::ConfigError;
 use super::settings::Config;
 
@@ -94,6 +96,9 @@ fn spellings() -> Vec<String> {
             collect(section, settings, &mut found);
         }
     }
+    found.extend(
+        Limits::constants().iter().map(|(row, _)| format!("LIMITS__{}", row.name.to_ascii_uppercase())),
+    );
     found
 }
 

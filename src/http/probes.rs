@@ -119,7 +119,7 @@ pub(super) async fn ready(
 
 /// Tells the metrics in Prometheus' text form.
 ///
-/// One text answers all scrapes of `limits.scrape_kept_s`.
+/// One text answers all scrapes of `scrape_kept_s`.
 #[utoipa::path(
     get,
     path = "/metrics",

@@ -22,23 +22,30 @@ pub struct Setting {
     pub least: Option<f64>,
     /// Largest value.
     pub most: Option<f64>,
-    /// Its meaning: what happens at this value, and at 0 where that is special.
+    /// Words that are allowed; none where any text is.
+    pub words: Vec<&'static str>,
+    /// Its meaning.
     pub sentence: String,
 }
+
+/// The largest whole number of a setting, which every language reads as what it is: 2^53.
+const INTEGER_MAX: f64 = (1u64 << f64::MANTISSA_DIGITS) as f64;
 
 /// What the value of a setting is, in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SettingKind {
     /// `true` or `false`.
     Boolean,
-    /// A whole number.
+    /// A whole number, not negative.
     Integer,
     /// A number.
     Number,
     /// A text.
     Text,
-    /// A list of values.
-    List,
+    /// A list of texts.
+    Texts,
+    /// Two corners, each of three numbers.
+    Corners,
 }
 
 /// Unit of a number.
@@ -49,6 +56,8 @@ pub enum Unit {
     none,
     /// Bytes.
     bytes,
+    /// Bytes a second.
+    bytes_per_s,
     /// 2^20 bytes.
     MiB,
     /// Seconds.
@@ -77,29 +86,44 @@ pub trait SettingValue {
     /// What its values are in a file.
     const KIND: SettingKind;
 
-    /// The value, where it is a number.
-    fn number(&self) -> Option<f64> {
+    /// Words that are allowed; none where any text is.
+    fn words() -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// The value where it is a number, and as people write it.
+    fn number(&self) -> Option<(f64, String)> {
         None
     }
 }
 
 impl Setting {
-    /// The values that are allowed, as text; none where all are.
+    /// The values that are allowed, as text; none where all of its kind are.
     pub fn range(&self) -> Option<String> {
-        match (self.least, self.most) {
-            (Some(least), Some(most)) => Some(format!("{least} to {most}")),
-            (Some(least), None) => Some(format!("at least {least}")),
-            (None, Some(most)) => Some(format!("at most {most}")),
-            (None, None) => None,
-        }
+        range(self.least, self.most)
     }
 
-    /// What is said of a value of this setting, which is called `key`, that is out of range; none of one that is not.
-    pub fn out_of_range(&self, key: &'static str, value: f64) -> Option<OutOfRange> {
-        let is_within =
-            self.least.is_none_or(|least| value >= least) && self.most.is_none_or(|most| value <= most);
-        let range = self.range().filter(|_| !is_within)?;
-        Some(OutOfRange { key, range, value: value.to_string() })
+    /// The smallest and the largest value, those of its kind where it has none of its own.
+    pub fn bounds(&self) -> (Option<f64>, Option<f64>) {
+        let of_kind = (self.kind == SettingKind::Integer).then_some((0.0, INTEGER_MAX));
+        (self.least.or(of_kind.map(|(least, _)| least)), self.most.or(of_kind.map(|(_, most)| most)))
+    }
+
+    /// What is said of a number of this setting, which is called `key`, that is out of range; none of one that is not.
+    pub fn out_of_range(&self, key: &'static str, (number, value): (f64, String)) -> Option<OutOfRange> {
+        let (least, most) = self.bounds();
+        let is_within = least.is_none_or(|least| number >= least) && most.is_none_or(|most| number <= most);
+        let range = range(least, most).filter(|_| !is_within)?;
+        Some(OutOfRange { key, range, value })
+    }
+}
+
+fn range(least: Option<f64>, most: Option<f64>) -> Option<String> {
+    match (least, most) {
+        (Some(least), Some(most)) => Some(format!("{least} to {most}")),
+        (Some(least), None) => Some(format!("at least {least}")),
+        (None, Some(most)) => Some(format!("at most {most}")),
+        (None, None) => None,
     }
 }
 
@@ -109,6 +133,7 @@ impl Unit {
         match self {
             Self::none => "",
             Self::bytes => "bytes",
+            Self::bytes_per_s => "bytes/s",
             Self::MiB => "MiB",
             Self::s => "s",
             Self::m => "m",
@@ -123,9 +148,9 @@ macro_rules! values {
         $(impl SettingValue for $type {
             const KIND: SettingKind = SettingKind::$kind;
             $(
-                fn number(&self) -> Option<f64> {
+                fn number(&self) -> Option<(f64, String)> {
                     let number: fn(Self) -> f64 = $number;
-                    Some(number(*self))
+                    Some((number(*self), self.to_string()))
                 }
             )?
         })+
@@ -143,22 +168,16 @@ values! {
     SocketAddr, Text;
     Durability, Text;
     StoreMode, Text;
+    Vec<String>, Texts;
+    [[f64; 3]; 2], Corners;
 }
 
 impl<T: SettingValue> SettingValue for Option<T> {
     const KIND: SettingKind = T::KIND;
 
-    fn number(&self) -> Option<f64> {
+    fn number(&self) -> Option<(f64, String)> {
         self.as_ref().and_then(T::number)
     }
-}
-
-impl<T> SettingValue for Vec<T> {
-    const KIND: SettingKind = SettingKind::List;
-}
-
-impl<T, const N: usize> SettingValue for [T; N] {
-    const KIND: SettingKind = SettingKind::List;
 }
 
 /// Makes a section of the settings from its rows: a sentence, a name, a type, a default, a unit, and the least and the
@@ -232,8 +251,27 @@ macro_rules! settings {
                     unit: $crate::Unit::$unit,
                     least: [$(f64::from($least))?].first().copied(),
                     most: [$(f64::from($most))?].first().copied(),
+                    words: <$type as $crate::SettingValue>::words(),
                     sentence: concat!($($doc),+).trim().to_owned(),
                 },)+]
+            }
+
+            /// The rows of what was a setting once, each with its value.
+            pub fn constants() -> Vec<($crate::Setting, String)> {
+                let constants = Self::default();
+                let _ = &constants;
+                vec![$($((
+                    $crate::Setting {
+                        name: stringify!($constant),
+                        kind: <$constant_type as $crate::SettingValue>::KIND,
+                        unit: $crate::Unit::none,
+                        least: None,
+                        most: None,
+                        words: Vec::new(),
+                        sentence: concat!($($constant_doc),+).trim().to_owned(),
+                    },
+                    constants.$constant.to_string(),
+                ),)+)?]
             }
 
             /// The first value that is out of its range.

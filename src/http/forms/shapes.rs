@@ -49,7 +49,7 @@ pub(in crate::http) struct OrientedBoxBody {
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::http) struct PrismBody {
-    /// x and y of each corner: 3 to `limits.keep_out_corners_max` of a polygon that does not cross itself, in
+    /// x and y of each corner: 3 to 64 of a polygon that does not cross itself, in
     /// either direction.
     #[schema(value_type = Vec<Vector2>, min_items = 3)]
     corners_m: Vec<[f64; 2]>,

@@ -42,7 +42,7 @@ pub(in crate::http) struct MotionsBody {
     step_m: Option<f32>,
     /// How far clearances are told, meters; they are not told without.
     clearance_max_m: Option<f32>,
-    /// Regions in which voxels do not count; `limits.ignored_regions_max` at most.
+    /// Regions in which voxels do not count; 64 at most.
     #[schema(value_type = Vec<DescribedIgnored>, required = false)]
     #[serde(default)]
     ignored: IgnoredList,

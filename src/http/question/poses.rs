@@ -34,7 +34,7 @@ pub(in crate::http) struct PosesBody {
     /// A pose `[x, y, z, qx, qy, qz, qw]` for each link, link by link, configuration by configuration.
     #[schema(value_type = Vec<PoseNumbers>)]
     configurations: NumbersField<7>,
-    /// Regions in which voxels do not count; `limits.ignored_regions_max` at most.
+    /// Regions in which voxels do not count; 64 at most.
     #[schema(value_type = Vec<DescribedIgnored>, required = false)]
     #[serde(default)]
     ignored: IgnoredList,

@@ -34,7 +34,7 @@ pub(in crate::http) struct SpheresBody {
     /// What every radius grows by, meters; 0 without.
     #[serde(default)]
     padding_m: f32,
-    /// Regions in which voxels do not count; `limits.ignored_regions_max` at most.
+    /// Regions in which voxels do not count; 64 at most.
     #[schema(value_type = Vec<DescribedIgnored>, required = false)]
     #[serde(default)]
     ignored: IgnoredList,

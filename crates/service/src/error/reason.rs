@@ -172,7 +172,7 @@ reasons! {
         GridTooLarge "grid_too_large" Both: "a grid of more than `grid_cells_max` cells, or of more than a message holds; in tiles, of more than 268,435,456", "ask for it in tiles, for a smaller area or larger cells";
         ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";
-        MapFull "map_full" Both: "the map would exceed `voxels_per_map_max`; a restored file also `map_file_scans_max`, `robots_per_map_max` or `viewpoint_bytes_max`", "make the map coarser, or raise the limit";
+        MapFull "map_full" Both: "the map would exceed `voxels_per_map_max`; a restored file also `robots_per_map_max`, `viewpoint_bytes_max` or `map_file_scans_max`, which is a constant", "make the map coarser, or raise the limit where it is a setting";
         MemoryFull "memory_full" Both 503: "little memory; what makes maps grow is refused", "delete a map, or give more memory";
         MessageTooLarge "message_too_large" Grpc: "a message exceeds `message_bytes_max`", "split it";
         Overloaded "overloaded" Both: "a limit on what is done at once, or on a caller's rate, is reached; the message names it", "wait as told, and retry";

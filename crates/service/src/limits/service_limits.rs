@@ -88,8 +88,8 @@ settings! {
         body_bytes_max: usize = 1 << 30; bytes;
         /// Silence in the middle of a body.
         body_silence_max_s: f64 = 30.0; s, from 0, to DAY_S;
-        /// Bytes a second: a slower body counts as silent. 0 = any byte will do.
-        body_bytes_per_s_min: u32 = 1024; bytes;
+        /// A slower body counts as silent. 0 = any byte will do.
+        body_bytes_per_s_min: u32 = 1024; bytes_per_s;
         /// Requests and messages of streams a second of one key, or of one address where there is no key. 0 = any
         /// number.
         caller_requests_per_s_max: u32 = 0; none;
@@ -106,10 +106,16 @@ settings! {
         /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle,
         /// it gives way. More than twice `requests_max`, and `streams_max` and `watches_max` besides.
         connections_max: usize = 2048; none;
+        /// Time until a connection is secure and begins to speak.
+        connection_opening_max_s: f64 = 10.0; s, from 0, to DAY_S;
         /// An HTTP connection without a request, or one request's headers.
         http_idle_max_s: f64 = 30.0; s, from 0, to DAY_S;
         /// A gRPC connection without a call.
         grpc_idle_max_s: f64 = 600.0; s, from 0, to DAY_S;
+        /// Time that the body of a health check may take.
+        probe_time_max_s: f64 = 5.0; s, from 0, to DAY_S;
+        /// A call of `grpc.health.v1.Health/Watch` without a key ends after so long.
+        health_watch_max_s: f64 = 600.0; s, from 0, to DAY_S;
         /// Waiting for `min_revision`. The call's own deadline may end it sooner.
         min_revision_wait_max_s: f64 = 10.0; s, from 0, to DAY_S;
         /// Aligning a scan that is not inserted. This and the next two count from when a thread begins with the work.
@@ -141,23 +147,17 @@ settings! {
         /// each, and for `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives
         /// way, or one of the peer that has most.
         connections_reserved: usize = 128;
-        /// Seconds until a connection has to be secure and to begin to speak.
-        connection_opening_max_s: f64 = 10.0;
         /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are
         /// taken, the oldest gives way.
         probes_max: usize = 64;
         /// Bytes of the body of a health check, which comes as it is: nothing is inflated.
         probe_body_bytes_max: usize = 1 << 10;
-        /// Seconds that the body of a health check may take.
-        probe_time_max_s: f64 = 5.0;
         /// Scrapes of the metrics that wait or are being read.
         scrapes_max: usize = 16;
         /// Seconds for which the text of a scrape answers those that follow.
         scrape_kept_s: f64 = 1.0;
         /// Calls of `grpc.health.v1.Health/Watch`, one a connection.
         health_watches_max: usize = 16;
-        /// Seconds that a health watch lasts that came without a key.
-        health_watch_max_s: f64 = 600.0;
         /// Keep-outs of a map.
         keep_outs_max: usize = KEEP_OUTS_MAX;
         /// Corners of a keep-out that is a prism.
