@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use super::error::ConfigError;
 use crate::access::is_host;
-use mrol_service::settings;
+use mrol_service::section;
 
-settings! {
+section! {
     /// Settings of access: which keys are valid, and who needs none. Keys are in a file of their own, so that the
     /// settings can be shown to anybody.
     pub struct AccessConfig in "access" {

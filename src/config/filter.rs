@@ -1,9 +1,9 @@
 //! Section `filter` of the settings: the filters of new maps whose requests do not say.
 
 use mrol_map::bloom::FilterSettings;
-use mrol_service::settings;
+use mrol_service::section;
 
-settings! {
+section! {
     /// Settings of the counting Bloom filters of new maps.
     pub struct FilterConfig in "filter" {
         /// Hash functions of the filters of maps whose makers do not say, k of eq. (1).

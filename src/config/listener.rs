@@ -3,9 +3,9 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use mrol_service::settings;
+use mrol_service::section;
 
-settings! {
+section! {
     /// Addresses at which a protocol is served.
     pub struct ListenerConfig in "http" {
         /// Address and port to listen at; port 0 takes a free one.

@@ -1,10 +1,10 @@
 //! Section `log` of the settings.
 
-use mrol_service::{SettingKind, SettingValue, settings};
+use mrol_service::{SettingKind, SettingValue, section};
 
 use crate::telemetry::LogFormat;
 
-settings! {
+section! {
     /// Settings of the log.
     pub struct LogConfig in "log" {
         /// Format of log lines: `text` or `json`.

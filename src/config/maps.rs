@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use mrol_service::settings;
+use mrol_service::section;
 
-use super::settings::MANY;
+/// The largest number of seconds and of MiB.
+const MANY: u32 = 1 << 20;
 
-settings! {
+section! {
     /// Which maps are kept in memory.
     pub struct MapsConfig in "maps" {
         /// Time after which a map that nobody uses or watches is saved and leaves memory; the next request opens it. 0

@@ -5,9 +5,9 @@ use mrol_map::align::Method;
 use mrol_map::mapping::{CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings};
 use mrol_map::scan::PointFilter;
 use mrol_map::util::Keyword;
-use mrol_service::{RobotSettings, SettingKind, SettingValue, settings};
+use mrol_service::{RobotSettings, SettingKind, SettingValue, section};
 
-settings! {
+section! {
     /// Settings of alignment.
     pub struct AlignmentConfig in "alignment" {
         /// Method for requests that do not say: `refined` or `overlap`.
@@ -15,7 +15,7 @@ settings! {
     }
 }
 
-settings! {
+section! {
     /// Settings of a robot's scans; a request may override each value.
     pub struct RobotConfig in "robots.NAME" {
         /// Points nearer to the sensor are skipped.

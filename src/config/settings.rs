@@ -26,8 +26,6 @@ use mrol_service::{Limits, OutOfRange, ServiceSettings, Setting, SettingKind, Se
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: f64 = 3600.0;
-/// The largest number of many things.
-pub(super) const MANY: u32 = 1 << 20;
 
 /// All settings of the daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

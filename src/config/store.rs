@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
-use super::settings::MANY;
 use mrol_map::map::TrajectorySpacing;
-use mrol_service::settings;
+use mrol_service::section;
 use mrol_store::{Durability, StoreMode, StoreSettings};
 
-settings! {
+/// The largest number of seconds and of MiB.
+const MANY: u32 = 1 << 20;
+
+section! {
     /// Settings of the store; see [`StoreSettings`].
     pub struct StoreConfig in "store" {
         /// A change is acknowledged when it is synced (`always`); or a sync interval (`200ms`, `1s`; 1 ms to 1 h).

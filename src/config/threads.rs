@@ -1,11 +1,11 @@
 //! Section `threads` of the settings.
 
-use mrol_service::settings;
+use mrol_service::section;
 
 /// The most threads of one kind.
 const THREADS_MAX: u32 = 1024;
 
-settings! {
+section! {
     /// Numbers of threads for work that uses the CPU.
     pub struct ThreadsConfig in "threads" {
         /// Threads for queries, listings and descriptions, and as many for planners' questions. 0 = one a core.

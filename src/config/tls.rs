@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use mrol_service::settings;
+use mrol_service::section;
 
 use super::access::WARNING_DAYS_MAX;
 
-settings! {
+section! {
     /// Settings of TLS for the TCP connections of both protocols. Without a certificate they are not encrypted. Unix
     /// sockets never are.
     pub struct TlsConfig in "tls" {

@@ -4,7 +4,8 @@
 //!
 //! Reading order of the rooms; none names a room of a later line:
 //!
-//! 1. `error`, `setting`, `limits`, `request`: how a request fails, how much it may ask, what it asks and how it is answered.
+//! 1. `error`, `setting`, `limits`, `request`: how a request fails, what a setting is, how much a request may ask, what
+//!    it asks and how it is answered.
 //! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
 //! 3. `commit`: how changes of a map become durable, then visible, then acknowledged.
 //! 4. `maps`: the maps by name, and what a hosted map is made of.

@@ -1,8 +1,9 @@
-//! Settings: a section of them as one table, from which its struct, its defaults, its checks and its documents are made.
+//! Settings: a section of them as one table, from which its struct, its defaults, its checks and its documents are
+//! made.
 //!
-//! A row has a sentence, a name, a type, a default, a unit, and the least and the largest value where there are any. The
-//! list of settings in `docs/guide/operations.md`, the comments of `mrol config print` and its JSON schema are made from
-//! the rows; tests say so.
+//! A row has a sentence, a name, a type, a default, a unit, and the least and the largest value where there are any.
+//! The list of settings in `docs/guide/operations.md`, the comments of `mrol config print` and its JSON schema are made
+//! from the rows; tests say so.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -185,7 +186,7 @@ impl<T: SettingValue> SettingValue for Option<T> {
 /// that sets one is read, and what it sets does not count.
 ///
 /// ```
-/// mrol_service::settings! {
+/// mrol_service::section! {
 ///     /// Settings of doors.
 ///     pub struct Doors in "doors" {
 ///         /// Doors that may be open at once.
@@ -201,7 +202,7 @@ impl<T: SettingValue> SettingValue for Option<T> {
 /// assert_eq!(Doors::settings()[1].sentence, "How long one may be open.");
 /// ```
 #[macro_export]
-macro_rules! settings {
+macro_rules! section {
     (
         $(#[$of_struct:meta])*
         $visible:vis struct $section:ident in $path:literal {

@@ -4,9 +4,9 @@ use mrol_map::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 use mrol_map::mapping::VIEWPOINT_BYTES_MAX_DEFAULT;
 use mrol_map::planning::FIELD_BYTES_MAX_DEFAULT;
 
-use crate::settings;
+use crate::section;
 
-settings! {
+section! {
     /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is
     /// named in the error of a request beyond it.
     pub struct Limits in "limits" {
