@@ -257,24 +257,6 @@ macro_rules! section {
                 },)+]
             }
 
-            /// The rows of what was a setting once, each with its value.
-            pub fn constants() -> Vec<($crate::Setting, String)> {
-                let constants = Self::default();
-                let _ = &constants;
-                vec![$($((
-                    $crate::Setting {
-                        name: stringify!($constant),
-                        kind: <$constant_type as $crate::SettingValue>::KIND,
-                        unit: $crate::Unit::none,
-                        least: None,
-                        most: None,
-                        words: Vec::new(),
-                        sentence: concat!($($constant_doc),+).trim().to_owned(),
-                    },
-                    constants.$constant.to_string(),
-                ),)+)?]
-            }
-
             /// The first value that is out of its range.
             pub fn out_of_range(&self) -> Option<$crate::OutOfRange> {
                 let values = [$((
@@ -286,6 +268,23 @@ macro_rules! section {
             }
 
             $(
+                /// The rows of what was a setting once, each with its value.
+                pub fn constants() -> Vec<($crate::Setting, String)> {
+                    let constants = Self::default();
+                    vec![$((
+                        $crate::Setting {
+                            name: stringify!($constant),
+                            kind: <$constant_type as $crate::SettingValue>::KIND,
+                            unit: $crate::Unit::none,
+                            least: None,
+                            most: None,
+                            words: Vec::new(),
+                            sentence: concat!($($constant_doc),+).trim().to_owned(),
+                        },
+                        constants.$constant.to_string(),
+                    ),)+]
+                }
+
                 /// This section with its constants as they are, and the names of those that were set to something else.
                 pub fn with_constants(mut self) -> (Self, Vec<&'static str>) {
                     let constants = Self::default();

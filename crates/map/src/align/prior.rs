@@ -164,7 +164,7 @@ impl PosePrior {
 
     /// How many standard deviations of what is known beforehand `pose` (map_from_sensor) is from the guess. Voxels of
     /// the finest level have sides of `resolution_m`.
-    pub(super) fn deviations(&self, pose: &Pose, resolution_m: f64) -> f64 {
+    pub(crate) fn deviations(&self, pose: &Pose, resolution_m: f64) -> f64 {
         let covariance = self.spread();
         covariance.deviations(&self.leveled_guess(), pose, resolution_m, FOUND_DEG.to_radians())
     }

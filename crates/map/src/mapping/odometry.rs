@@ -65,3 +65,21 @@ impl OdometrySettings {
         PoseCovariance::isotropic(self.speed_max_m_per_s * seconds / 3.0, turn_rad)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::PosePrior;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn half_a_turn_is_likely_after_two_seconds_and_not_after_half_a_one() {
+        let turned = Pose::new(Vector3::zeros(), Vector3::z() * std::f64::consts::PI);
+        let deviations = |seconds| {
+            let expected = Some(OdometrySettings::default().after(seconds));
+            PosePrior { expected, ..Pose::identity().into() }.deviations(&turned, 0.1)
+        };
+        assert!((deviations(2.0) - 1.5).abs() < 0.01, "{}", deviations(2.0));
+        assert!((deviations(0.5) - 6.0).abs() < 0.01, "{}", deviations(0.5));
+    }
+}

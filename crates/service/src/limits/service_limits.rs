@@ -234,6 +234,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn times_lie_within_a_day() {
+        type Set = fn(&mut Limits, f64);
+        let times: [(&str, Set); 3] = [
+            ("limits.alignment_time_max_s", |limits, seconds| limits.alignment_time_max_s = seconds),
+            ("limits.insertion_time_max_s", |limits, seconds| limits.insertion_time_max_s = seconds),
+            ("limits.undo_time_max_s", |limits, seconds| limits.undo_time_max_s = seconds),
+        ];
+        for (name, set) in times {
+            for (seconds, is_fine) in
+                [(0.0, true), (86_400.0, true), (86_400.1, false), (-0.1, false), (f64::NAN, false)]
+            {
+                let mut limits = Limits::default();
+                set(&mut limits, seconds);
+                let refused = limits.out_of_range().map(|refused| (refused.key, refused.range));
+                let expected = (!is_fine).then(|| (name, "0 to 86400".to_owned()));
+                assert_eq!(refused, expected, "{name} {seconds}");
+            }
+        }
+    }
+
+    #[test]
     fn what_lies_in_memory_for_a_while_is_an_eighth_of_what_there_is_at_most() {
         let limits = Limits::default();
         assert_eq!(limits.clone().within_memory(None), limits);
