@@ -5,6 +5,7 @@ use axum::extract::DefaultBodyLimit;
 
 use super::adapter::Adapter;
 use super::middleware::Http;
+use super::openapi::openapi_json;
 use super::routes;
 use super::scrapes::Scrapes;
 use crate::middleware::Middleware;
@@ -13,6 +14,8 @@ use crate::middleware::Middleware;
 pub fn router(middleware: &Middleware, message_bytes_max: usize) -> Router {
     let (admission, metrics) = (middleware.admission().clone(), middleware.recorder().metrics().clone());
     let scrapes = Scrapes::new(admission.scrape_kept());
+    let description = openapi_json;
+    let adapter = Adapter { admission, metrics, message_bytes_max, scrapes, description };
     let routes = routes::of_operations().layer(DefaultBodyLimit::max(message_bytes_max));
-    middleware.wrap(Http, routes).with_state(Adapter { admission, metrics, message_bytes_max, scrapes })
+    middleware.wrap(Http, routes).with_state(adapter)
 }

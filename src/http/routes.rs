@@ -1,15 +1,16 @@
-//! Which handler answers which operation.
+//! Which handler answers which operation: the one list of handlers.
 
 use axum::Router;
 use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
+use utoipa::OpenApi;
 
 use super::adapter::Adapter;
 use super::operations::{
     block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, scans,
     trajectory, undo, voxels, watch,
 };
-use super::{openapi, probes, question, reader, viewer};
+use super::{probes, question, reader, viewer};
 use crate::access::Operation;
 
 /// A route for every operation that HTTP has, and none besides.
@@ -25,62 +26,75 @@ fn served(operation: Operation) -> Option<(&'static str, MethodRouter<Adapter>)>
     Some((route.path, handler(operation, method)?))
 }
 
-/// What answers an operation by HTTP. There is no other place where a handler comes to be served, and an operation
-/// that is not decided upon here does not compile.
-fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Adapter>> {
-    Some(match operation {
-        Operation::ListMaps => on(method, maps::list),
-        Operation::CreateMap => on(method, maps::create),
-        Operation::GetMap => on(method, maps::describe),
-        Operation::DeleteMap => on(method, maps::delete),
-        Operation::InsertScan => on(method, scans::insert),
-        Operation::AlignScan => on(method, scans::align),
-        Operation::Localize => on(method, localization::localize),
-        Operation::QueryPoints => on(method, occupancy::query),
-        Operation::CheckPoses => on(method, question::poses::check_poses),
-        Operation::CheckSpheres => on(method, question::spheres::check_spheres),
-        Operation::CheckMotions => on(method, question::motions::check_motions),
-        Operation::CastRays => on(method, question::rays::cast_rays),
-        Operation::FindNearest => on(method, question::nearest::find_nearest),
-        Operation::ClassifyPoints => on(method, question::classify::classify_points),
-        Operation::ListFrontiers => on(method, question::frontiers::list_frontiers),
-        Operation::ProjectGrid => on(method, question::grid::project_grid),
-        Operation::StreamGrid => on(method, question::grid::stream_grid),
-        Operation::DeleteVoxels => on(method, deletions::delete),
-        Operation::Undo => on(method, undo::undo),
-        Operation::GetTrajectory => on(method, trajectory::get),
-        Operation::ListVoxels => on(method, voxels::list),
-        Operation::GetBlock => on(method, block::get),
-        Operation::ListObservers => on(method, observers::list),
-        Operation::Watch => on(method, watch::watch),
-        Operation::ListEvents => on(method, events::list),
-        Operation::WatchEvents => on(method, events::watch),
-        Operation::ListKeepOuts => on(method, keep_outs::list),
-        Operation::PutKeepOut => on(method, keep_outs::put),
-        Operation::DeleteKeepOut => on(method, keep_outs::delete),
-        Operation::SnapshotMap => on(method, map_file::take),
-        Operation::RestoreMap => on(method, map_file::restore),
-        Operation::ShowViewer => on(method, viewer::pages::index),
-        Operation::GetViewerFile => on(method, viewer::pages::file),
-        Operation::Live => on(method, probes::live),
-        Operation::Ready => on(method, probes::ready),
-        Operation::Metrics => on(method, probes::metrics),
-        Operation::DescribeApi => on(method, openapi::describe),
-        Operation::ReadApi => on(method, reader::page::page),
-        Operation::ReadApiFile => on(method, reader::page::file),
-        Operation::QueryPointsStream
-        | Operation::CheckPosesStream
-        | Operation::CheckSpheresStream
-        | Operation::CheckMotionsStream
-        | Operation::CastRaysStream
-        | Operation::FindNearestStream
-        | Operation::ClassifyPointsStream
-        | Operation::InsertScanStream
-        | Operation::StreamTrajectory
-        | Operation::Reflect
-        | Operation::HealthCheck
-        | Operation::HealthWatch => return None,
-    })
+/// Makes, from one list, what answers each operation, and the description of all of them.
+macro_rules! handlers {
+    (
+        over HTTP { $($operation:ident => $($part:ident)::+;)+ }
+        over gRPC alone { $($other:ident),+ }
+    ) => {
+        /// What answers an operation by HTTP. There is no other place where a handler comes to be served, and an
+        /// operation that is not decided upon here does not compile.
+        fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Adapter>> {
+            Some(match operation {
+                $(Operation::$operation => on(method, $($part)::+),)+
+                $(Operation::$other)|+ => return None,
+            })
+        }
+
+        /// What the attributes of the handlers say of them.
+        #[derive(OpenApi)]
+        #[openapi(paths($($($part)::+),+))]
+        pub(super) struct Described;
+    };
+}
+
+handlers! {
+    over HTTP {
+        ListMaps => maps::list;
+        CreateMap => maps::create;
+        GetMap => maps::describe;
+        DeleteMap => maps::delete;
+        SnapshotMap => map_file::take;
+        RestoreMap => map_file::restore;
+        InsertScan => scans::insert;
+        AlignScan => scans::align;
+        Localize => localization::localize;
+        DeleteVoxels => deletions::delete;
+        Undo => undo::undo;
+        GetTrajectory => trajectory::get;
+        ListEvents => events::list;
+        WatchEvents => events::watch;
+        ListKeepOuts => keep_outs::list;
+        PutKeepOut => keep_outs::put;
+        DeleteKeepOut => keep_outs::delete;
+        QueryPoints => occupancy::query;
+        CheckPoses => question::poses::check_poses;
+        CheckSpheres => question::spheres::check_spheres;
+        CheckMotions => question::motions::check_motions;
+        CastRays => question::rays::cast_rays;
+        FindNearest => question::nearest::find_nearest;
+        ClassifyPoints => question::classify::classify_points;
+        ListFrontiers => question::frontiers::list_frontiers;
+        ProjectGrid => question::grid::project_grid;
+        StreamGrid => question::grid::stream_grid;
+        ListVoxels => voxels::list;
+        GetBlock => block::get;
+        ListObservers => observers::list;
+        Watch => watch::watch;
+        Live => probes::live;
+        Ready => probes::ready;
+        Metrics => probes::metrics;
+        ShowViewer => viewer::pages::index;
+        GetViewerFile => viewer::pages::file;
+        DescribeApi => reader::description::describe;
+        ReadApi => reader::page::page;
+        ReadApiFile => reader::page::file;
+    }
+    over gRPC alone {
+        QueryPointsStream, CheckPosesStream, CheckSpheresStream, CheckMotionsStream, CastRaysStream,
+        FindNearestStream, ClassifyPointsStream, InsertScanStream, StreamTrajectory, Reflect, HealthCheck,
+        HealthWatch
+    }
 }
 
 #[cfg(test)]

@@ -29,9 +29,18 @@ class Region(Structure):
     _fields_ = [("kind", c_int32), ("reserved", c_uint32), ("numbers", c_double * 10)]
 
 
+class Scope(Structure):
+    _fields_ = [
+        ("level", c_uint32),
+        ("ignore_keep_outs", c_uint8),
+        ("reserved", c_uint8 * 3),
+    ]
+
+
 class MotionCheck(Structure):
     _fields_ = [
         ("struct_size", c_size_t),
+        ("scope", Scope),
         ("body", Body),
         ("configurations", POINTER(c_float)),
         ("count", c_size_t),
@@ -39,11 +48,10 @@ class MotionCheck(Structure):
         ("motions", c_size_t),
         ("ignored", POINTER(Region)),
         ("ignored_count", c_size_t),
-        ("level", c_uint32),
         ("step_m", c_float),
         ("clearance_max_m", c_float),
-        ("ignore_keep_outs", c_uint8),
-        ("reserved", c_uint8 * 3),
+        ("unknown_is_occupied", c_uint8),
+        ("reserved", c_uint8 * 7),
     ]
 
 

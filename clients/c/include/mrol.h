@@ -267,10 +267,21 @@ typedef struct mrol_region {
     double numbers[10];
 } mrol_region;
 
+/* What all questions have in common. All zero: level 0, and keep-outs count as voxels do. */
+typedef struct mrol_scope {
+    /* Level of the voxels: 0 is the finest. */
+    uint32_t level;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_scope;
+
 /* A question: does a body fit at these configurations? Take it from mrol_pose_check_default(). */
 typedef struct mrol_pose_check {
     /* sizeof(mrol_pose_check) where the program was compiled; so in all structs that begin with it. */
     size_t struct_size;
+    mrol_scope scope;
     mrol_body body;
     /* `count` configurations: a pose for each link of the body, in the order of links. */
     const float *configurations;
@@ -278,21 +289,18 @@ typedef struct mrol_pose_check {
     /* Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. */
     const mrol_region *ignored;
     size_t ignored_count;
-    /* Level of the voxels: 0 is the finest. */
-    uint32_t level;
     /* Up to where clearances are told, at most 64 voxels of the level, which 0 stands for. */
     float clearance_max_m;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* 1: a voxel counts unless it is free: seen through by a scan, and not occupied. Costs more. */
     uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[6];
+    uint8_t reserved[3];
 } mrol_pose_check;
 
 /* A question: do these spheres meet anything? Take it from mrol_sphere_check_default(). */
 typedef struct mrol_sphere_check {
     size_t struct_size;
+    mrol_scope scope;
     /* `count` spheres in the map's frame: center x y z and radius each. */
     const float *spheres;
     size_t count;
@@ -301,17 +309,14 @@ typedef struct mrol_sphere_check {
     size_t groups;
     const mrol_region *ignored;
     size_t ignored_count;
-    uint32_t level;
     /* What is added to all radii. */
     float padding_m;
     /* As in mrol_pose_check. */
     float clearance_max_m;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* As in mrol_pose_check. */
     uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[2];
+    uint8_t reserved[7];
 } mrol_sphere_check;
 
 /* Where the answers to checks of poses and spheres go. What is NULL is not wanted; places for hits and for clearances are not
@@ -342,6 +347,7 @@ typedef struct mrol_collisions {
  * mrol_motion_check_default(). */
 typedef struct mrol_motion_check {
     size_t struct_size;
+    mrol_scope scope;
     mrol_body body;
     /* `count` configurations of all motions, one motion after the other. */
     const float *configurations;
@@ -351,7 +357,6 @@ typedef struct mrol_motion_check {
     size_t motions;
     const mrol_region *ignored;
     size_t ignored_count;
-    uint32_t level;
     /* How far a point of the body moves from one check for voxels to the next, at most. 0: half a voxel of the level. Keep-outs,
      * which may be thinner, are met along the whole way, to within X: 1 mm, half a voxel of level 0, or the step, whichever is
      * least, at every level. Nothing enters a keep-out by more than half of X unnoticed, and what is no larger than that goes
@@ -359,12 +364,10 @@ typedef struct mrol_motion_check {
     float step_m;
     /* As in mrol_pose_check. */
     float clearance_max_m;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* As in mrol_pose_check. */
     uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[2];
+    uint8_t reserved[7];
 } mrol_motion_check;
 
 /* Where the answers to checks of motions go; NULL: not wanted. Take it from mrol_motion_answers_default(). */
@@ -385,6 +388,7 @@ typedef struct mrol_motion_answers {
 /* A question: what do these rays meet? What a ray would enter just where it ends is not met, voxel or keep-out. Take it from mrol_ray_question_default(). */
 typedef struct mrol_ray_question {
     size_t struct_size;
+    mrol_scope scope;
     /* Where rays begin: one point for all of them, or one each. */
     const float *origins;
     size_t origins_count;
@@ -395,13 +399,10 @@ typedef struct mrol_ray_question {
     size_t count;
     /* Length of rays with directions; 0: as far as the map goes. */
     double range_m;
-    uint32_t level;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* As in mrol_pose_check. */
     uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[2];
+    uint8_t reserved[7];
 } mrol_ray_question;
 
 /* Where the answers about rays go; NULL: not wanted. Take it from mrol_ray_answers_default(). */
@@ -431,16 +432,14 @@ enum {
 /* A question: what is nearest to these points? Take it from mrol_nearest_question_default(), and set radius_m. */
 typedef struct mrol_nearest_question {
     size_t struct_size;
+    mrol_scope scope;
     const float *points;
     size_t count;
     /* How far to look: above 0, at most 64 voxels of the level. */
     double radius_m;
-    uint32_t level;
     mrol_measured_to to;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[7];
+    uint8_t reserved[4];
 } mrol_nearest_question;
 
 /* Where the answers about points go; NULL: not wanted. Take it from mrol_nearest_answers_default(). */
@@ -463,13 +462,9 @@ typedef struct mrol_nearest_answers {
 /* A question: what is known of these points? Take it from mrol_classify_question_default(). */
 typedef struct mrol_classify_question {
     size_t struct_size;
+    mrol_scope scope;
     const float *points;
     size_t count;
-    uint32_t level;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
-    /* Not used: zero. */
-    uint8_t reserved[3];
 } mrol_classify_question;
 
 /* Where the answers about points go; NULL: not wanted. A point that is neither occupied nor free is unknown. Take it from
@@ -488,6 +483,7 @@ typedef struct mrol_classify_answers {
  * box. */
 typedef struct mrol_frontier_question {
     size_t struct_size;
+    mrol_scope scope;
     /* Smallest and largest x y z of the box that is looked into, at most 4,000,000 voxels. */
     double min_m[3];
     double max_m[3];
@@ -495,11 +491,6 @@ typedef struct mrol_frontier_question {
     double standoff_m;
     /* Least number of voxels of a frontier. 0: 8. */
     uint64_t size_min;
-    uint32_t level;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
-    /* Not used: zero. */
-    uint8_t reserved[3];
 } mrol_frontier_question;
 
 /* Free voxels that hang together, each beside an unknown one. */
@@ -533,6 +524,7 @@ typedef struct mrol_frontier_answers {
 /* A question: what is the map, seen from above? Take it from mrol_grid_question_default(). */
 typedef struct mrol_grid_question {
     size_t struct_size;
+    mrol_scope scope;
     /* Smallest and largest x and y, where has_area is 1; otherwise all that is there. Cells lie at whole multiples of their
      * side, and every cell that the area meets belongs to the grid. */
     double area_min_m[2];
@@ -543,16 +535,13 @@ typedef struct mrol_grid_question {
     double max_z_m;
     /* Side of a cell: a whole number of the level's voxels. 0: one voxel. */
     double cell_m;
-    uint32_t level;
     uint8_t has_area;
     uint8_t has_min_z;
     uint8_t has_max_z;
-    /* 1: keep-outs of the map do not count. */
-    uint8_t ignore_keep_outs;
     /* 1: tell free cells from unknown ones. Takes more time. */
     uint8_t tell_unknown;
     /* Not used: zero. */
-    uint8_t reserved[7];
+    uint8_t reserved[4];
 } mrol_grid_question;
 
 /* How large a grid is: cell (x, y) has the number y * cells[0] + x. */
@@ -825,7 +814,7 @@ mrol_code mrol_body_free(mrol_body body, mrol_error *error);
  *     list_frontiers   frontiers that are written, and all that there are
  *     project_grid     cells, and those that are occupied
  *
- * Keep-outs of the map count as voxels do unless ignore_keep_outs is 1; where one is met instead of a voxel its name is told.
+ * Keep-outs of the map count as voxels do unless scope.ignore_keep_outs is 1; where one is met instead of a voxel its name is told.
  * What the questions mean is said once, for all interfaces, in docs/guide/planners.md. A body that is asked about for the first
  * time at a level takes longer, as does a place that nobody asked about: what a question learns is kept beside the copy.
  *

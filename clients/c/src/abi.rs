@@ -239,7 +239,7 @@ mod tests {
     use crate::questions::{
         ClassifyPlaces, ClassifyQuestion, CollisionPlaces, FrontierPlaces, FrontierQuestion, GridPlaces,
         GridQuestion, MotionCheck, MotionPlaces, NearestPlaces, NearestQuestion, PoseCheck, RayPlaces,
-        RayQuestion, SphereCheck,
+        RayQuestion, Scope, SphereCheck,
     };
     use crate::scans::{Localization, Localized, Scan, ScanOutcome};
 
@@ -282,21 +282,22 @@ mod tests {
             "mrol_body" BodyHandle { number }
             "mrol_link" LinkParts { spheres spheres_count points points_count padding_m reserved }
             "mrol_region" RegionNumbers { kind reserved numbers }
-            "mrol_pose_check" PoseCheck { struct_size body configurations count ignored ignored_count level clearance_max_m ignore_keep_outs unknown_is_occupied reserved }
-            "mrol_sphere_check" SphereCheck { struct_size spheres count sizes groups ignored ignored_count level padding_m clearance_max_m ignore_keep_outs unknown_is_occupied reserved }
+            "mrol_scope" Scope { level ignore_keep_outs reserved }
+            "mrol_pose_check" PoseCheck { struct_size scope body configurations count ignored ignored_count clearance_max_m unknown_is_occupied reserved }
+            "mrol_sphere_check" SphereCheck { struct_size scope spheres count sizes groups ignored ignored_count padding_m clearance_max_m unknown_is_occupied reserved }
             "mrol_collisions" CollisionPlaces { struct_size capacity colliding hit_links hit_parts hit_voxels clearances_m nearest_links hit_keep_outs }
-            "mrol_motion_check" MotionCheck { struct_size body configurations count lengths motions ignored ignored_count level step_m clearance_max_m ignore_keep_outs unknown_is_occupied reserved }
+            "mrol_motion_check" MotionCheck { struct_size scope body configurations count lengths motions ignored ignored_count step_m clearance_max_m unknown_is_occupied reserved }
             "mrol_motion_answers" MotionPlaces { struct_size capacity is_free first_hits clearances_m }
-            "mrol_ray_question" RayQuestion { struct_size origins origins_count directions ends count range_m level ignore_keep_outs unknown_is_occupied reserved }
+            "mrol_ray_question" RayQuestion { struct_size scope origins origins_count directions ends count range_m unknown_is_occupied reserved }
             "mrol_ray_answers" RayPlaces { struct_size capacity hit distances_m voxels keep_outs }
-            "mrol_nearest_question" NearestQuestion { struct_size points count radius_m level to ignore_keep_outs reserved }
+            "mrol_nearest_question" NearestQuestion { struct_size scope points count radius_m to reserved }
             "mrol_nearest_answers" NearestPlaces { struct_size capacity found distances_m voxels away keep_outs }
-            "mrol_classify_question" ClassifyQuestion { struct_size points count level ignore_keep_outs reserved }
+            "mrol_classify_question" ClassifyQuestion { struct_size scope points count }
             "mrol_classify_answers" ClassifyPlaces { struct_size capacity is_occupied is_free }
-            "mrol_frontier_question" FrontierQuestion { struct_size min_m max_m standoff_m size_min level ignore_keep_outs reserved }
+            "mrol_frontier_question" FrontierQuestion { struct_size scope min_m max_m standoff_m size_min }
             "mrol_frontier" FrontierNumbers { voxels center_m min_m max_m view_m view_rotation target_m yaw_rad elevation_rad has_view reserved }
             "mrol_frontier_answers" FrontierPlaces { struct_size capacity frontiers }
-            "mrol_grid_question" GridQuestion { struct_size area_min_m area_max_m min_z_m max_z_m cell_m level has_area has_min_z has_max_z ignore_keep_outs tell_unknown reserved }
+            "mrol_grid_question" GridQuestion { struct_size scope area_min_m area_max_m min_z_m max_z_m cell_m has_area has_min_z has_max_z tell_unknown reserved }
             "mrol_grid_shape" GridShape { cell_m origin_m cells reserved }
             "mrol_grid_answers" GridPlaces { struct_size capacity shape occupied tops_m is_free }
         };

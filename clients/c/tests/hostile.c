@@ -246,11 +246,13 @@ static void bad_checks(mrol_replica replica, mrol_body body) {
     CHECK_FAILS("check.configurations is at address");
     check = good, check.count = SIZE_MAX / 2, other = places, other.capacity = SIZE_MAX;
     FAILS(CHECK(&check, &other), MROL_INVALID_ARGUMENT, "check.configurations: at most");
-    check = good, check.level = 4;
+    check = good, check.scope.level = 4;
     CHECK_FAILS("level must lie in 0..=3, got 4");
-    check = good, check.reserved[5] = 1;
+    check = good, check.reserved[2] = 1;
     CHECK_FAILS("check.reserved must be zero");
-    check = good, check.ignore_keep_outs = 2;
+    check = good, check.scope.reserved[0] = 1;
+    CHECK_FAILS("check.scope.reserved must be zero");
+    check = good, check.scope.ignore_keep_outs = 2;
     CHECK_FAILS("ignore_keep_outs must be 0 or 1, got 2");
     check = good, check.ignored_count = 1;
     CHECK_FAILS("ignored is NULL");

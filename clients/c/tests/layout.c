@@ -152,30 +152,33 @@ int main(void) {
     FIELD(mrol_region, numbers);
     SIZE(mrol_region);
 
+    FIELD(mrol_scope, level);
+    FIELD(mrol_scope, ignore_keep_outs);
+    FIELD(mrol_scope, reserved);
+    SIZE(mrol_scope);
+
     FIELD(mrol_pose_check, struct_size);
+    FIELD(mrol_pose_check, scope);
     FIELD(mrol_pose_check, body);
     FIELD(mrol_pose_check, configurations);
     FIELD(mrol_pose_check, count);
     FIELD(mrol_pose_check, ignored);
     FIELD(mrol_pose_check, ignored_count);
-    FIELD(mrol_pose_check, level);
     FIELD(mrol_pose_check, clearance_max_m);
-    FIELD(mrol_pose_check, ignore_keep_outs);
     FIELD(mrol_pose_check, unknown_is_occupied);
     FIELD(mrol_pose_check, reserved);
     SIZE(mrol_pose_check);
 
     FIELD(mrol_sphere_check, struct_size);
+    FIELD(mrol_sphere_check, scope);
     FIELD(mrol_sphere_check, spheres);
     FIELD(mrol_sphere_check, count);
     FIELD(mrol_sphere_check, sizes);
     FIELD(mrol_sphere_check, groups);
     FIELD(mrol_sphere_check, ignored);
     FIELD(mrol_sphere_check, ignored_count);
-    FIELD(mrol_sphere_check, level);
     FIELD(mrol_sphere_check, padding_m);
     FIELD(mrol_sphere_check, clearance_max_m);
-    FIELD(mrol_sphere_check, ignore_keep_outs);
     FIELD(mrol_sphere_check, unknown_is_occupied);
     FIELD(mrol_sphere_check, reserved);
     SIZE(mrol_sphere_check);
@@ -192,6 +195,7 @@ int main(void) {
     SIZE(mrol_collisions);
 
     FIELD(mrol_motion_check, struct_size);
+    FIELD(mrol_motion_check, scope);
     FIELD(mrol_motion_check, body);
     FIELD(mrol_motion_check, configurations);
     FIELD(mrol_motion_check, count);
@@ -199,10 +203,8 @@ int main(void) {
     FIELD(mrol_motion_check, motions);
     FIELD(mrol_motion_check, ignored);
     FIELD(mrol_motion_check, ignored_count);
-    FIELD(mrol_motion_check, level);
     FIELD(mrol_motion_check, step_m);
     FIELD(mrol_motion_check, clearance_max_m);
-    FIELD(mrol_motion_check, ignore_keep_outs);
     FIELD(mrol_motion_check, unknown_is_occupied);
     FIELD(mrol_motion_check, reserved);
     SIZE(mrol_motion_check);
@@ -215,14 +217,13 @@ int main(void) {
     SIZE(mrol_motion_answers);
 
     FIELD(mrol_ray_question, struct_size);
+    FIELD(mrol_ray_question, scope);
     FIELD(mrol_ray_question, origins);
     FIELD(mrol_ray_question, origins_count);
     FIELD(mrol_ray_question, directions);
     FIELD(mrol_ray_question, ends);
     FIELD(mrol_ray_question, count);
     FIELD(mrol_ray_question, range_m);
-    FIELD(mrol_ray_question, level);
-    FIELD(mrol_ray_question, ignore_keep_outs);
     FIELD(mrol_ray_question, unknown_is_occupied);
     FIELD(mrol_ray_question, reserved);
     SIZE(mrol_ray_question);
@@ -236,12 +237,11 @@ int main(void) {
     SIZE(mrol_ray_answers);
 
     FIELD(mrol_nearest_question, struct_size);
+    FIELD(mrol_nearest_question, scope);
     FIELD(mrol_nearest_question, points);
     FIELD(mrol_nearest_question, count);
     FIELD(mrol_nearest_question, radius_m);
-    FIELD(mrol_nearest_question, level);
     FIELD(mrol_nearest_question, to);
-    FIELD(mrol_nearest_question, ignore_keep_outs);
     FIELD(mrol_nearest_question, reserved);
     SIZE(mrol_nearest_question);
 
@@ -255,11 +255,9 @@ int main(void) {
     SIZE(mrol_nearest_answers);
 
     FIELD(mrol_classify_question, struct_size);
+    FIELD(mrol_classify_question, scope);
     FIELD(mrol_classify_question, points);
     FIELD(mrol_classify_question, count);
-    FIELD(mrol_classify_question, level);
-    FIELD(mrol_classify_question, ignore_keep_outs);
-    FIELD(mrol_classify_question, reserved);
     SIZE(mrol_classify_question);
 
     FIELD(mrol_classify_answers, struct_size);
@@ -269,13 +267,11 @@ int main(void) {
     SIZE(mrol_classify_answers);
 
     FIELD(mrol_frontier_question, struct_size);
+    FIELD(mrol_frontier_question, scope);
     FIELD(mrol_frontier_question, min_m);
     FIELD(mrol_frontier_question, max_m);
     FIELD(mrol_frontier_question, standoff_m);
     FIELD(mrol_frontier_question, size_min);
-    FIELD(mrol_frontier_question, level);
-    FIELD(mrol_frontier_question, ignore_keep_outs);
-    FIELD(mrol_frontier_question, reserved);
     SIZE(mrol_frontier_question);
 
     FIELD(mrol_frontier, voxels);
@@ -297,16 +293,15 @@ int main(void) {
     SIZE(mrol_frontier_answers);
 
     FIELD(mrol_grid_question, struct_size);
+    FIELD(mrol_grid_question, scope);
     FIELD(mrol_grid_question, area_min_m);
     FIELD(mrol_grid_question, area_max_m);
     FIELD(mrol_grid_question, min_z_m);
     FIELD(mrol_grid_question, max_z_m);
     FIELD(mrol_grid_question, cell_m);
-    FIELD(mrol_grid_question, level);
     FIELD(mrol_grid_question, has_area);
     FIELD(mrol_grid_question, has_min_z);
     FIELD(mrol_grid_question, has_max_z);
-    FIELD(mrol_grid_question, ignore_keep_outs);
     FIELD(mrol_grid_question, tell_unknown);
     FIELD(mrol_grid_question, reserved);
     SIZE(mrol_grid_question);

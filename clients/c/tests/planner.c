@@ -131,8 +131,8 @@ static void check_poses(void) {
     int kind = (int)number();
     float *read;
     check.body = body;
-    check.level = (uint32_t)number();
-    check.ignore_keep_outs = ignores;
+    check.scope.level = (uint32_t)number();
+    check.scope.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.configurations = read = numbers(7 * links * check.count);
@@ -146,8 +146,8 @@ static void check_spheres(void) {
     mrol_collisions places;
     int kind = (int)number();
     float *read;
-    check.level = (uint32_t)number();
-    check.ignore_keep_outs = ignores;
+    check.scope.level = (uint32_t)number();
+    check.scope.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.spheres = read = numbers(4 * check.count);
@@ -163,8 +163,8 @@ static void check_motions(void) {
     size_t motions;
     float *read;
     check.body = body;
-    check.level = (uint32_t)number();
-    check.ignore_keep_outs = ignores;
+    check.scope.level = (uint32_t)number();
+    check.scope.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.configurations = read = numbers(7 * links * check.count);
@@ -185,8 +185,8 @@ static void cast_rays(void) {
     mrol_ray_answers places = mrol_ray_answers_default();
     float *read, *directions, *origins;
     size_t i, count;
-    question.level = (uint32_t)number();
-    question.ignore_keep_outs = ignores;
+    question.scope.level = (uint32_t)number();
+    question.scope.ignore_keep_outs = ignores;
     question.range_m = number();
     count = question.count = question.origins_count = places.capacity = (size_t)number();
     read = numbers(6 * count);
@@ -214,8 +214,8 @@ static void find_nearest(void) {
     mrol_nearest_answers places = mrol_nearest_answers_default();
     float *read;
     size_t count;
-    question.level = (uint32_t)number();
-    question.ignore_keep_outs = ignores;
+    question.scope.level = (uint32_t)number();
+    question.scope.ignore_keep_outs = ignores;
     question.to = (mrol_measured_to)number();
     question.radius_m = number();
     count = question.count = places.capacity = (size_t)number();
@@ -241,8 +241,8 @@ static void project_grid(void) {
     mrol_grid_answers places = mrol_grid_answers_default();
     mrol_grid_shape shape;
     size_t cells;
-    question.level = (uint32_t)number();
-    question.ignore_keep_outs = ignores;
+    question.scope.level = (uint32_t)number();
+    question.scope.ignore_keep_outs = ignores;
     question.has_min_z = question.has_max_z = 1;
     question.min_z_m = number(), question.max_z_m = number();
     places.shape = &shape;

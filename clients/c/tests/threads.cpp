@@ -109,8 +109,9 @@ void share_a_body(const char *address, const char *map) {
     std::vector<std::thread> threads;
     for (int i = 0; i < 4; i++) {
         threads.emplace_back([&] {
-            for (bool is_first = true; replica.moves_freely(body) != Moves::no_body; is_first = false) {
-                if (is_first) answered++;
+            must(replica.moves_freely(body) == Moves::freely, "a body that nobody freed is known");
+            answered++;
+            while (replica.moves_freely(body) != Moves::no_body) {
             }
         });
     }

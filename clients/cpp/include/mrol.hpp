@@ -274,6 +274,13 @@ struct surroundings {
     bool ignore_keep_outs = false;
     // A voxel counts unless some scan saw through it.
     bool unknown_is_occupied = false;
+
+    // What all questions have of it.
+    mrol_scope scope() const noexcept {
+        mrol_scope scope{};
+        scope.level = level, scope.ignore_keep_outs = ignore_keep_outs;
+        return scope;
+    }
 };
 
 // What a ray meets first.
@@ -330,7 +337,7 @@ public:
         mrol_pose_check check = mrol_pose_check_default();
         check.body = of.handle(), check.configurations = numbers.data();
         check.count = count_of(configurations, of);
-        check.level = with.level, check.ignore_keep_outs = with.ignore_keep_outs;
+        check.scope = with.scope();
         check.unknown_is_occupied = with.unknown_is_occupied;
         std::vector<std::uint8_t> bits(MROL_BITMAP_BYTES(check.count));
         mrol_collisions places = mrol_collisions_default();
@@ -353,7 +360,7 @@ public:
         std::uint8_t bit = 0;
         check.body = of.handle(), check.configurations = numbers, check.count = count;
         check.lengths = &length, check.motions = 1;
-        check.level = with.level, check.ignore_keep_outs = with.ignore_keep_outs;
+        check.scope = with.scope();
         check.unknown_is_occupied = with.unknown_is_occupied;
         mrol_motion_answers places = mrol_motion_answers_default();
         places.capacity = 1, places.is_free = &bit;
@@ -367,7 +374,7 @@ public:
         mrol_ray_question question = mrol_ray_question_default();
         question.origins = origins.data(), question.origins_count = origins.size();
         question.ends = ends.data(), question.count = ends.size();
-        question.level = with.level, question.ignore_keep_outs = with.ignore_keep_outs;
+        question.scope = with.scope();
         question.unknown_is_occupied = with.unknown_is_occupied;
         std::vector<std::uint8_t> bits(MROL_BITMAP_BYTES(ends.size()));
         std::vector<float> distances(ends.size());
@@ -384,7 +391,7 @@ public:
     std::vector<float> distances(const points &asked, double radius_m, const surroundings &with = {}) const {
         mrol_nearest_question question = mrol_nearest_question_default();
         question.points = asked.data(), question.count = asked.size(), question.radius_m = radius_m;
-        question.level = with.level, question.ignore_keep_outs = with.ignore_keep_outs;
+        question.scope = with.scope();
         std::vector<float> distances(asked.size());
         mrol_nearest_answers places = mrol_nearest_answers_default();
         places.capacity = asked.size(), places.distances_m = distances.data();

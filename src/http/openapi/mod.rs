@@ -11,5 +11,4 @@ mod from_table;
 mod optional_parts;
 mod request_id;
 
-pub(crate) use document::describe;
 pub use document::openapi_json;

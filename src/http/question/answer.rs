@@ -15,7 +15,7 @@ use mrol_map::voxel::VoxelKey;
 use mrol_service::{MapService, MapVersion, Reason, ServiceError};
 
 /// An array of an answer, as bytes.
-pub(super) enum Array {
+pub(in crate::http) enum Array {
     /// So many bits.
     Bits(Bytes, usize),
     /// Floats of four bytes, one a value. JSON has null in the place of what is not finite.
@@ -30,12 +30,15 @@ pub(super) enum Array {
     Names(Vec<String>, Bytes),
 }
 
+/// The arrays of an answer, each with its name.
+pub(in crate::http) type Arrays = Vec<(&'static str, Array)>;
+
 /// An answer that is put together.
 pub(super) struct Answer<H> {
     /// What is no array.
     pub(super) head: H,
     pub(super) version: MapVersion,
-    pub(super) arrays: Vec<(&'static str, Array)>,
+    pub(super) arrays: Arrays,
 }
 
 impl Array {

@@ -4,7 +4,7 @@ use axum::body::Bytes;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::answer::Array;
+use super::answer::{Array, Arrays};
 use super::form::{NumbersField, PointsField};
 use crate::http::forms::JsonPoints;
 use crate::http::forms::List;
@@ -14,7 +14,7 @@ use crate::json::{JsonVersion, Sphere, VoxelIndex, described_by_words};
 use mrol_client::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
 use mrol_map::map::Region;
 use mrol_map::util::Keyword;
-use mrol_service::{CheckAs, ServiceError};
+use mrol_service::{Collisions, ServiceError};
 
 /// A body: its links.
 #[derive(Deserialize, ToSchema)]
@@ -130,7 +130,7 @@ pub(super) fn ignored_of(List(ignored): IgnoredList) -> Result<Vec<pb::Region>, 
 
 /// What of an answer to a check is no array.
 #[derive(Serialize, ToSchema)]
-pub(super) struct CheckedHead {
+pub(in crate::http) struct CheckedHead {
     /// How many were checked.
     checked: u64,
     /// How many of them collide.
@@ -168,28 +168,26 @@ pub(super) struct CheckedResponse {
 }
 
 /// The head and the arrays of an answer to a check.
-pub(super) fn collisions_of(
-    collisions: pb::Collisions,
-    answer: CheckAs,
-) -> (CheckedHead, Vec<(&'static str, Array)>) {
+pub(super) fn collisions_answered(collisions: Collisions) -> (CheckedHead, Arrays) {
+    let with_hits = matches!(collisions, Collisions::FirstHits(_));
+    let with_clearances = matches!(collisions, Collisions::Clearances(_));
+    let collisions = pb::Collisions::from(collisions);
     let pb::Collisions { checked, colliding, colliding_count, hit_keep_outs, .. } = collisions;
-    let head = CheckedHead { checked, colliding_count };
     let mut arrays = vec![("colliding", Array::Bits(colliding.clone(), checked as usize))];
-    match answer {
-        CheckAs::Colliding => {}
-        CheckAs::FirstHit => {
-            let voxels = Array::voxels(collisions.hit_voxels_u64le, &colliding, hit_keep_outs.as_ref());
-            arrays.extend([
-                ("hit_links", Array::Numbers(collisions.hit_links_u32le)),
-                ("hit_parts", Array::Numbers(collisions.hit_parts_u32le)),
-                ("hit_voxels", voxels),
-            ]);
-            arrays.extend(Array::keep_outs("hit_keep_outs", hit_keep_outs));
-        }
-        CheckAs::Clearance { .. } => arrays.extend([
+    if with_hits {
+        let voxels = Array::voxels(collisions.hit_voxels_u64le, &colliding, hit_keep_outs.as_ref());
+        arrays.extend([
+            ("hit_links", Array::Numbers(collisions.hit_links_u32le)),
+            ("hit_parts", Array::Numbers(collisions.hit_parts_u32le)),
+            ("hit_voxels", voxels),
+        ]);
+        arrays.extend(Array::keep_outs("hit_keep_outs", hit_keep_outs));
+    }
+    if with_clearances {
+        arrays.extend([
             ("clearances_m", Array::Floats(collisions.clearances_m_f32le)),
             ("nearest_links", Array::Numbers(collisions.nearest_links_u32le)),
-        ]),
+        ]);
     }
-    (head, arrays)
+    (CheckedHead { checked, colliding_count }, arrays)
 }

@@ -80,8 +80,8 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
 }
 
 impl<T: Send + 'static> QuestionBody<T> {
-    /// The question, of which `message` makes the message that asks it.
-    pub(super) async fn question<M, Q>(
+    /// The question that `message` asks, made of the head and the arrays.
+    pub(super) async fn parse<M, Q>(
         self,
         service: &MapService,
         message: impl FnOnce(T, &Bytes) -> Result<M, ServiceError> + Send + 'static,

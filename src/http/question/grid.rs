@@ -13,48 +13,37 @@ use serde::{Deserialize, Serialize};
 use tokio_stream::StreamExt;
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Array};
-use super::asked::asked;
+use super::answer::{Array, Arrays};
 use super::form::QuestionBody;
+use super::handler::{AnswerOf, HttpQuestion, question_handler};
+use super::scope::question_body;
 use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
 use crate::http::forms::Map;
 use crate::http::forms::Object;
-use crate::http::forms::{AnswerBytes, GridTileBytes, QuestionBytes};
+use crate::http::forms::{GridTileBytes, QuestionBytes};
 use crate::http::middleware::Service;
 use crate::json::{JsonVersion, Sizes2, Vector2};
 use mrol_client::wire::{framed, pb};
-use mrol_map::map::MapName;
 use mrol_service::{GridQuestion, ServiceError};
 
-/// Which part of the map is seen from above.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({"min_z_m": 0.2, "max_z_m": 1.5, "tell_unknown": true}))]
-pub(in crate::http) struct GridBody {
-    /// The rectangle; that of the map without.
-    #[schema(value_type = Option<AreaBody>)]
-    area: Option<Object<AreaBody>>,
-    /// Lower voxels do not count, meters.
-    min_z_m: Option<f64>,
-    /// Higher voxels do not count, meters.
-    max_z_m: Option<f64>,
-    /// Side of a cell, meters: a whole number of voxels; one without.
-    cell_m: Option<f64>,
-    /// Whether free cells are told from unknown ones; false without.
-    #[serde(default)]
-    tell_unknown: bool,
-    /// The level, 0 the finest; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
-    min_revision: Option<u64>,
-    /// The map that the answer must speak of: another one is refused (`map_replaced`).
-    #[schema(format = "uuid")]
-    map_uuid: Option<String>,
-    /// Whether keep-outs count for nothing; false without: they count as occupied.
-    #[serde(default)]
-    ignore_keep_outs: bool,
+question_body! {
+    /// Which part of the map is seen from above.
+    #[schema(example = json!({"min_z_m": 0.2, "max_z_m": 1.5, "tell_unknown": true}))]
+    pub(in crate::http) struct GridBody {
+        /// The rectangle; that of the map without.
+        #[schema(value_type = Option<AreaBody>)]
+        area: Option<Object<AreaBody>>,
+        /// Lower voxels do not count, meters.
+        min_z_m: Option<f64>,
+        /// Higher voxels do not count, meters.
+        max_z_m: Option<f64>,
+        /// Side of a cell, meters: a whole number of voxels; one without.
+        cell_m: Option<f64>,
+        /// Whether free cells are told from unknown ones; false without.
+        #[serde(default)]
+        tell_unknown: bool,
+    }
 }
 
 /// A rectangle of the map frame, meters.
@@ -71,7 +60,7 @@ struct AreaBody {
 
 /// The map from above.
 #[derive(Serialize, ToSchema)]
-struct GridHead {
+pub(in crate::http) struct GridHead {
     /// Side of a cell, meters.
     cell_m: f64,
     /// The corner of the first cell.
@@ -105,54 +94,42 @@ struct GridResponse {
     version: JsonVersion,
 }
 
-impl GridBody {
-    fn into_message(self, map: &MapName) -> pb::ProjectGridRequest {
+question_handler! {
+    /// Projects the map from above to a 2-D grid.
+    project_grid, "/v1/maps/{map}/grid", GridBody => GridResponse
+}
+
+impl HttpQuestion for GridBody {
+    type Message = pb::ProjectGridRequest;
+    type Question = GridQuestion;
+    type Head = GridHead;
+
+    fn into_message(self, scope: pb::Asked, _: &Bytes) -> Result<pb::ProjectGridRequest, ServiceError> {
         let area =
             self.area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
                 pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
             });
-        let asked = asked(map, (self.level, self.ignore_keep_outs), self.min_revision, self.map_uuid);
         let Self { min_z_m, max_z_m, cell_m, tell_unknown, .. } = self;
-        pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m, tell_unknown }
+        Ok(pb::ProjectGridRequest { asked: Some(scope), area, min_z_m, max_z_m, cell_m, tell_unknown })
     }
-}
 
-/// Projects the map from above to a 2-D grid.
-#[utoipa::path(
-    post,
-    path = "/v1/maps/{map}/grid",
-    request_body(content((GridBody = "application/json"), (QuestionBytes = "application/octet-stream"))),
-    responses((
-        status = 200,
-        description = "Answered",
-        content((GridResponse = "application/json"), (AnswerBytes = "application/octet-stream"))
-    ))
-)]
-pub(in crate::http) async fn project_grid(
-    Service(service): Service,
-    Map(map): Map,
-    asking: QuestionBody<GridBody>,
-) -> Result<Response, HttpError> {
-    let form = asking.form;
-    let message = move |of: GridBody, _: &Bytes| Ok(of.into_message(&map));
-    let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
-    let answered = service.ask(&map, question).await?;
-    let version = answered.version;
-    let response = pb::ProjectGridResponse::from(answered);
-    let head = GridHead {
-        cell_m: response.cell_m,
-        origin_m: [response.origin_x_m, response.origin_y_m],
-        size: [response.cells_x, response.cells_y],
-        cells_occupied: response.cells_occupied,
-        cells_free: response.free.as_ref().map(|_| response.cells_free),
-    };
-    let cells = (response.cells_x * response.cells_y) as usize;
-    let mut arrays = vec![
-        ("occupied", Array::Bits(response.occupied, cells)),
-        ("tops_m", Array::Floats(response.tops_m_f32le)),
-    ];
-    arrays.extend(response.free.map(|free| ("free", Array::Bits(free, cells))));
-    Answer { head, version, arrays }.respond(form, &service).await
+    fn answered(answer: AnswerOf<Self>) -> (GridHead, Arrays) {
+        let response = pb::ProjectGridResponse::from(answer);
+        let head = GridHead {
+            cell_m: response.cell_m,
+            origin_m: [response.origin_x_m, response.origin_y_m],
+            size: [response.cells_x, response.cells_y],
+            cells_occupied: response.cells_occupied,
+            cells_free: response.free.as_ref().map(|_| response.cells_free),
+        };
+        let cells = (response.cells_x * response.cells_y) as usize;
+        let mut arrays = vec![
+            ("occupied", Array::Bits(response.occupied, cells)),
+            ("tops_m", Array::Floats(response.tops_m_f32le)),
+        ];
+        arrays.extend(response.free.map(|free| ("free", Array::Bits(free, cells))));
+        (head, arrays)
+    }
 }
 
 /// Projects the map from above to a 2-D grid that comes in tiles, each at a revision of its own.
@@ -171,8 +148,7 @@ pub(in crate::http) async fn stream_grid(
     Map(map): Map,
     asking: QuestionBody<GridBody>,
 ) -> Result<Response, HttpError> {
-    let message = move |of: GridBody, _: &Bytes| Ok(of.into_message(&map));
-    let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
+    let (map, question) = asking.question(&service, map).await?;
     let tiles = service.grid_tiles(&map, question).await?.into_stream(adapter.admission.told_to_drain());
     let tiles = tiles.map(|tile| {
         let failure = |error: ServiceError| pb::GridTile::from(pb::Failure::from(error));

@@ -1,71 +1,56 @@
 //! `POST /v1/maps/{map}/motions`: can a body move along these configurations?
 
 use axum::body::Bytes;
-use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::answer::{Answer, Array};
-use super::asked::asked;
+use super::answer::{Array, Arrays};
 use super::body::{BodyField, DescribedIgnored, IgnoredList, ignored_of};
-use super::form::{CountsField, NumbersField, QuestionBody};
-use crate::http::error::HttpError;
-use crate::http::forms::Map;
+use super::form::{CountsField, NumbersField};
+use super::handler::{AnswerOf, HttpQuestion, question_handler};
+use super::scope::question_body;
 use crate::http::forms::Object;
-use crate::http::forms::{AnswerBytes, QuestionBytes};
-use crate::http::middleware::Service;
 use crate::json::described;
 use crate::json::{ByKeyword, JsonVersion, PoseNumbers};
 use mrol_client::wire::pb;
 use mrol_map::planning::Unknown;
-use mrol_service::MotionCheck;
+use mrol_service::{MotionCheck, ServiceError};
 
-/// A body and its motions.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({
-    "body": {"links": [{"spheres": [[0, 0, 0, 0.2]]}]},
-    "configurations": [[0, 0, 1, 0, 0, 0, 1], [0.5, 0, 1, 0, 0, 0, 1]], "lengths": [2]
-}))]
-pub(in crate::http) struct MotionsBody {
-    /// The body.
-    #[schema(value_type = BodyField)]
-    body: Object<BodyField>,
-    /// A pose `[x, y, z, qx, qy, qz, qw]` for each link, link by link, configuration by configuration, motion
-    /// by motion.
-    #[schema(value_type = Vec<PoseNumbers>)]
-    configurations: NumbersField<7>,
-    /// How many configurations each motion has.
-    #[schema(value_type = Vec<u32>)]
-    lengths: CountsField,
-    /// How far a point of the body moves from one check to the next, at most, meters; half a voxel without.
-    step_m: Option<f32>,
-    /// How far clearances are told, meters; they are not told without.
-    clearance_max_m: Option<f32>,
-    /// Regions in which voxels do not count; 64 at most.
-    #[schema(value_type = Vec<DescribedIgnored>, required = false)]
-    #[serde(default)]
-    ignored: IgnoredList,
-    /// What voxels are that no scan saw through: free or occupied; `free` without.
-    #[schema(value_type = described::Unknown, required = false)]
-    #[serde(default)]
-    unknown: ByKeyword<Unknown>,
-    /// The level, 0 the finest; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
-    min_revision: Option<u64>,
-    /// The map that the answer must speak of: another one is refused (`map_replaced`).
-    #[schema(format = "uuid")]
-    map_uuid: Option<String>,
-    /// Whether keep-outs count for nothing; false without: they count as occupied.
-    #[serde(default)]
-    ignore_keep_outs: bool,
+question_body! {
+    /// A body and its motions.
+    #[schema(example = json!({
+        "body": {"links": [{"spheres": [[0, 0, 0, 0.2]]}]},
+        "configurations": [[0, 0, 1, 0, 0, 0, 1], [0.5, 0, 1, 0, 0, 0, 1]], "lengths": [2]
+    }))]
+    pub(in crate::http) struct MotionsBody {
+        /// The body.
+        #[schema(value_type = BodyField)]
+        body: Object<BodyField>,
+        /// A pose `[x, y, z, qx, qy, qz, qw]` for each link, link by link, configuration by configuration, motion
+        /// by motion.
+        #[schema(value_type = Vec<PoseNumbers>)]
+        configurations: NumbersField<7>,
+        /// How many configurations each motion has.
+        #[schema(value_type = Vec<u32>)]
+        lengths: CountsField,
+        /// How far a point of the body moves from one check to the next, at most, meters; half a voxel without.
+        step_m: Option<f32>,
+        /// How far clearances are told, meters; they are not told without.
+        clearance_max_m: Option<f32>,
+        /// Regions in which voxels do not count; 64 at most.
+        #[schema(value_type = Vec<DescribedIgnored>, required = false)]
+        #[serde(default)]
+        ignored: IgnoredList,
+        /// What voxels are that no scan saw through: free or occupied; `free` without.
+        #[schema(value_type = described::Unknown, required = false)]
+        #[serde(default)]
+        unknown: ByKeyword<Unknown>,
+    }
 }
 
 /// What is told of motions as numbers.
 #[derive(Serialize, ToSchema)]
-struct MotionsHead {
+pub(in crate::http) struct MotionsHead {
     /// How many motions were checked.
     motions: u64,
     /// How many of them are free.
@@ -89,47 +74,40 @@ struct MotionsResponse {
     version: JsonVersion,
 }
 
-/// Tells whether a body can move along its motions.
-#[utoipa::path(
-    post,
-    path = "/v1/maps/{map}/motions",
-    request_body(content((MotionsBody = "application/json"), (QuestionBytes = "application/octet-stream"))),
-    responses((
-        status = 200,
-        description = "Answered",
-        content((MotionsResponse = "application/json"), (AnswerBytes = "application/octet-stream"))
-    ))
-)]
-pub(in crate::http) async fn check_motions(
-    Service(service): Service,
-    Map(map): Map,
-    asking: QuestionBody<MotionsBody>,
-) -> Result<Response, HttpError> {
-    let form = asking.form;
-    let message = move |of: MotionsBody, arrays: &Bytes| {
-        let Object(body) = of.body;
+question_handler! {
+    /// Tells whether a body can move along its motions.
+    check_motions, "/v1/maps/{map}/motions", MotionsBody => MotionsResponse
+}
+
+impl HttpQuestion for MotionsBody {
+    type Message = pb::CheckMotionsRequest;
+    type Question = MotionCheck;
+    type Head = MotionsHead;
+
+    fn into_message(self, scope: pb::Asked, arrays: &Bytes) -> Result<pb::CheckMotionsRequest, ServiceError> {
+        let Object(body) = self.body;
         Ok(pb::CheckMotionsRequest {
-            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            asked: Some(scope),
             body: Some(body.into_message(arrays)?),
-            configurations_f32le: of.configurations.into_bytes(arrays, "configurations")?,
-            lengths_u32le: of.lengths.into_bytes(arrays, "lengths")?,
-            step_m: of.step_m,
-            clearance_max_m: of.clearance_max_m,
-            ignored: ignored_of(of.ignored)?,
-            unknown: pb::Unknown::from(of.unknown.0).into(),
+            configurations_f32le: self.configurations.into_bytes(arrays, "configurations")?,
+            lengths_u32le: self.lengths.into_bytes(arrays, "lengths")?,
+            step_m: self.step_m,
+            clearance_max_m: self.clearance_max_m,
+            ignored: ignored_of(self.ignored)?,
+            unknown: pb::Unknown::from(self.unknown.0).into(),
         })
-    };
-    let (map, check): (_, MotionCheck) = asking.question(&service, message).await?;
-    let answered = service.ask(&map, check).await?;
-    let version = answered.version;
-    let response = pb::CheckMotionsResponse::from(answered);
-    let pb::CheckMotionsResponse { motions, free_count, .. } = response;
-    let mut arrays = vec![
-        ("free", Array::Bits(response.free, motions as usize)),
-        ("first_hits", Array::Floats(response.first_hits_f32le)),
-    ];
-    if !response.clearances_m_f32le.is_empty() {
-        arrays.push(("clearances_m", Array::Floats(response.clearances_m_f32le)));
     }
-    Answer { head: MotionsHead { motions, free_count }, version, arrays }.respond(form, &service).await
+
+    fn answered(answer: AnswerOf<Self>) -> (MotionsHead, Arrays) {
+        let response = pb::CheckMotionsResponse::from(answer);
+        let pb::CheckMotionsResponse { motions, free_count, .. } = response;
+        let mut arrays = vec![
+            ("free", Array::Bits(response.free, motions as usize)),
+            ("first_hits", Array::Floats(response.first_hits_f32le)),
+        ];
+        if !response.clearances_m_f32le.is_empty() {
+            arrays.push(("clearances_m", Array::Floats(response.clearances_m_f32le)));
+        }
+        (MotionsHead { motions, free_count }, arrays)
+    }
 }

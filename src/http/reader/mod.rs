@@ -1,7 +1,7 @@
-//! `GET /docs`: a page that shows the description of the HTTP interface and sends requests from it.
+//! `GET /openapi.json`, the description of the HTTP interface, and `GET /docs`, a page that shows it and sends requests.
 //!
 //! The page and what starts it are here; what shows the description is Swagger UI, embedded by its crate. Nothing comes
 //! from another host. Addresses are relative, so that a proxy may serve it below another path.
 
-/// Named by the description, which needs what stands beside the handlers.
+pub(super) mod description;
 pub(super) mod page;

@@ -5,7 +5,7 @@ use mrol_client::service::{Answered, CheckAs, Collisions};
 use mrol_client::voxel::VoxelKey;
 
 use super::regions::{RegionNumbers, surroundings_but};
-use super::{Form, Name, asked, check_reserved, ones, unless_zero};
+use super::{Form, Name, Scope, check_reserved, ones, unless_zero};
 use crate::abi::Answer;
 use crate::bodies::{BODIES, BodyHandle, spheres_of};
 use crate::failure::Failure;
@@ -17,16 +17,15 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct PoseCheck {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) body: BodyHandle,
     pub(crate) configurations: *const f32,
     pub(crate) count: usize,
     pub(crate) ignored: *const RegionNumbers,
     pub(crate) ignored_count: usize,
-    pub(crate) level: u32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) ignore_keep_outs: u8,
     pub(crate) unknown_is_occupied: u8,
-    pub(crate) reserved: [u8; 6],
+    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -40,18 +39,17 @@ unsafe impl Question for PoseCheck {
 #[repr(C)]
 pub struct SphereCheck {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) spheres: *const f32,
     pub(crate) count: usize,
     pub(crate) sizes: *const u32,
     pub(crate) groups: usize,
     pub(crate) ignored: *const RegionNumbers,
     pub(crate) ignored_count: usize,
-    pub(crate) level: u32,
     pub(crate) padding_m: f32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) ignore_keep_outs: u8,
     pub(crate) unknown_is_occupied: u8,
-    pub(crate) reserved: [u8; 2],
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -192,7 +190,7 @@ impl Form for PoseCheck {
             )
         };
         let question = mrol_client::service::PoseCheck {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("check")?,
             body,
             configurations: numbers.to_vec(),
             surroundings,
@@ -232,7 +230,7 @@ impl Form for SphereCheck {
             )
         };
         let question = mrol_client::service::SphereCheck {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("check")?,
             spheres: spheres_of(spheres),
             sizes,
             padding_m: self.padding_m,

@@ -1,6 +1,6 @@
 //! Points as what is known of them: occupied, free, or unknown.
 
-use super::{Form, asked, check_reserved};
+use super::{Form, Scope};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -11,11 +11,9 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct ClassifyQuestion {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) points: *const f32,
     pub(crate) count: usize,
-    pub(crate) level: u32,
-    pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -44,7 +42,6 @@ impl Form for ClassifyQuestion {
     type Places = ClassifyPlaces;
 
     unsafe fn ask(&self, places: &ClassifyPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
-        check_reserved(&self.reserved, "question")?;
         // SAFETY: as the caller promises.
         let points = unsafe { memory::points_of(self.points, self.count, "question.points") }?;
         let mut room = Places::new(self.count, places.capacity)?.beside(points.as_slice());
@@ -55,7 +52,7 @@ impl Form for ClassifyQuestion {
                 room.bitmap(places.is_free, "answers.is_free")?,
             )
         };
-        let asked = asked(self.level, self.ignore_keep_outs)?;
+        let asked = self.scope.asked("question")?;
         let answered = replica.ask(&mrol_client::service::ClassifyQuestion { asked, points })?;
         let states = &answered.answer;
         if let Some(to) = is_occupied {

@@ -3,7 +3,7 @@
 use mrol_client::geometry::{rotation_xyzw, translation_m};
 use mrol_client::planning::Frontier;
 
-use super::{Form, asked, check_reserved, unless_zero};
+use super::{Form, Scope, unless_zero};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{Places, Plain, Question};
@@ -14,13 +14,11 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct FrontierQuestion {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) min_m: [f64; 3],
     pub(crate) max_m: [f64; 3],
     pub(crate) standoff_m: f64,
     pub(crate) size_min: u64,
-    pub(crate) level: u32,
-    pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -90,9 +88,8 @@ impl Form for FrontierQuestion {
     type Places = FrontierPlaces;
 
     unsafe fn ask(&self, places: &FrontierPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
-        check_reserved(&self.reserved, "question")?;
         let question = mrol_client::service::FrontierQuestion {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("question")?,
             min_m: self.min_m,
             max_m: self.max_m,
             size_min: unless_zero(self.size_min),

@@ -3,7 +3,7 @@
 use mrol_client::planning::{Grid, GridArea};
 use mrol_client::service::GridScope;
 
-use super::{Form, asked, check_reserved, ones, unless_zero};
+use super::{Form, Scope, check_reserved, ones, unless_zero};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{Out, Places, Question, flag};
@@ -14,18 +14,17 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct GridQuestion {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) area_min_m: [f64; 2],
     pub(crate) area_max_m: [f64; 2],
     pub(crate) min_z_m: f64,
     pub(crate) max_z_m: f64,
     pub(crate) cell_m: f64,
-    pub(crate) level: u32,
     pub(crate) has_area: u8,
     pub(crate) has_min_z: u8,
     pub(crate) has_max_z: u8,
-    pub(crate) ignore_keep_outs: u8,
     pub(crate) tell_unknown: u8,
-    pub(crate) reserved: [u8; 7],
+    pub(crate) reserved: [u8; 4],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -121,10 +120,8 @@ impl Form for GridQuestion {
     unsafe fn ask(&self, places: &GridPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
         // SAFETY: as the caller promises.
         let shape = unsafe { Out::of(places.shape, "answers.shape") }.required()?;
-        let question = mrol_client::service::GridQuestion {
-            asked: asked(self.level, self.ignore_keep_outs)?,
-            scope: self.scope()?,
-        };
+        let question =
+            mrol_client::service::GridQuestion { asked: self.scope.asked("question")?, scope: self.scope()? };
         if !places.is_free.is_null() && !question.scope.tells_unknown {
             return Err(Failure::argument("answers.is_free is told where question.tell_unknown is 1"));
         }

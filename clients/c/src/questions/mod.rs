@@ -65,10 +65,23 @@ pub(crate) unsafe fn ask<F: Form>(
     })
 }
 
-/// What all questions have in common. A copy is asked as it is: programs wait for revisions beforehand.
-fn asked(level: u32, ignore_keep_outs: u8) -> Result<Asked, Failure> {
-    let ignore_keep_outs = memory::flag(ignore_keep_outs, "ignore_keep_outs")?;
-    Ok(Asked { level, ignore_keep_outs, ..Asked::default() })
+/// `mrol_scope`: what all questions have in common.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(crate) struct Scope {
+    pub(crate) level: u32,
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 3],
+}
+
+impl Scope {
+    /// What the question `name` has in common with others. A copy is asked as it is: programs wait for revisions
+    /// beforehand.
+    fn asked(&self, name: &str) -> Result<Asked, Failure> {
+        check_reserved(&self.reserved, &format!("{name}.scope"))?;
+        let ignore_keep_outs = memory::flag(self.ignore_keep_outs, "ignore_keep_outs")?;
+        Ok(Asked { level: self.level, ignore_keep_outs, ..Asked::default() })
+    }
 }
 
 /// What unknown voxels count as.

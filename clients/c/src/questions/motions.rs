@@ -3,7 +3,7 @@
 use mrol_client::planning::{MotionAnswer, NUMBERS_PER_POSE};
 
 use super::regions::{RegionNumbers, surroundings_but};
-use super::{Form, asked, check_reserved, unless_zero};
+use super::{Form, Scope, check_reserved, unless_zero};
 use crate::abi::Answer;
 use crate::bodies::{BODIES, BodyHandle};
 use crate::failure::Failure;
@@ -15,6 +15,7 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct MotionCheck {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) body: BodyHandle,
     pub(crate) configurations: *const f32,
     pub(crate) count: usize,
@@ -22,12 +23,10 @@ pub struct MotionCheck {
     pub(crate) motions: usize,
     pub(crate) ignored: *const RegionNumbers,
     pub(crate) ignored_count: usize,
-    pub(crate) level: u32,
     pub(crate) step_m: f32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) ignore_keep_outs: u8,
     pub(crate) unknown_is_occupied: u8,
-    pub(crate) reserved: [u8; 2],
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -134,10 +133,10 @@ impl Form for MotionCheck {
         };
         let clearance_max_m = arrays.clearances_m.as_ref().map(|_| match unless_zero(self.clearance_max_m) {
             Some(most_m) => most_m,
-            None => replica.clearance_max_m(self.level),
+            None => replica.clearance_max_m(self.scope.level),
         });
         let question = mrol_client::service::MotionCheck {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("check")?,
             body,
             configurations: numbers.to_vec(),
             lengths,

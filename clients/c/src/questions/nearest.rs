@@ -2,7 +2,7 @@
 
 use mrol_client::planning::MeasuredTo;
 
-use super::{Form, Name, asked, check_reserved, write_names};
+use super::{Form, Name, Scope, check_reserved, write_names};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -13,13 +13,12 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct NearestQuestion {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) points: *const f32,
     pub(crate) count: usize,
     pub(crate) radius_m: f64,
-    pub(crate) level: u32,
     pub(crate) to: i32,
-    pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 7],
+    pub(crate) reserved: [u8; 4],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -71,7 +70,7 @@ impl Form for NearestQuestion {
             )
         };
         let question = mrol_client::service::NearestQuestion {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("question")?,
             points,
             radius_m: self.radius_m,
             to,

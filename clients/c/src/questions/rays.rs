@@ -2,7 +2,7 @@
 
 use mrol_client::service::{PointCloud, RaysToward};
 
-use super::{Form, Name, asked, check_reserved, unknown, unless_zero, write_names};
+use super::{Form, Name, Scope, check_reserved, unknown, unless_zero, write_names};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -13,16 +13,15 @@ use crate::replicas::OpenReplica;
 #[repr(C)]
 pub struct RayQuestion {
     pub(crate) struct_size: usize,
+    pub(crate) scope: Scope,
     pub(crate) origins: *const f32,
     pub(crate) origins_count: usize,
     pub(crate) directions: *const f32,
     pub(crate) ends: *const f32,
     pub(crate) count: usize,
     pub(crate) range_m: f64,
-    pub(crate) level: u32,
-    pub(crate) ignore_keep_outs: u8,
     pub(crate) unknown_is_occupied: u8,
-    pub(crate) reserved: [u8; 2],
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -102,7 +101,7 @@ impl Form for RayQuestion {
             )
         };
         let answered = replica.ask(&mrol_client::service::RayQuestion {
-            asked: asked(self.level, self.ignore_keep_outs)?,
+            asked: self.scope.asked("question")?,
             origins,
             toward,
             unknown: unknown(self.unknown_is_occupied)?,
