@@ -81,7 +81,7 @@ class Planner(Copy):
         # All memory of an edge is made once, and used again for every edge.
         self.numbers, self.is_free, self.first_hit = (c_float * 14)(), (c_uint8 * 1)(), (c_float * 1)()
         self.numbers[6] = self.numbers[13] = 1
-        self.check = MotionCheck(sizeof(MotionCheck), self.body, self.numbers, 2)
+        self.check = MotionCheck(sizeof(MotionCheck), Scope(), self.body, self.numbers, 2)
         self.answers = MotionAnswers(sizeof(MotionAnswers), 1, self.is_free, self.first_hit)
 
     def __exit__(self, *_):
