@@ -4,7 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::settings::Config;
 use super::{
-    AccessConfig, AlignmentConfig, FilterConfig, ListenerConfig, LogConfig, MapsConfig, RobotConfig,
+    AccessConfig, AdminConfig, AlignmentConfig, FilterConfig, ListenerConfig, LogConfig, MapsConfig,
+    RobotConfig,
 };
 use super::{StoreConfig, ThreadsConfig, TlsConfig};
 use mrol_service::{Limits, Setting, SettingKind, Unit};
@@ -23,6 +24,7 @@ fn sections() -> Vec<Section> {
         ("", Config::top().into()),
         ("http", ListenerConfig::settings()),
         ("grpc", ListenerConfig::settings()),
+        ("admin", AdminConfig::settings()),
         ("access", AccessConfig::settings()),
         ("tls", TlsConfig::settings()),
         ("log", LogConfig::settings()),

@@ -1,6 +1,7 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
 mod access;
+mod admin;
 mod documented;
 mod error;
 mod filter;
@@ -17,6 +18,7 @@ mod tls;
 mod variables;
 
 pub use access::AccessConfig;
+pub use admin::AdminConfig;
 pub use error::ConfigError;
 pub use filter::FilterConfig;
 pub use listener::ListenerConfig;

@@ -1,6 +1,7 @@
 //! All settings, from defaults, a file, variables and options.
 
 use super::access::AccessConfig;
+use super::admin::AdminConfig;
 use super::error::ConfigError;
 use super::filter::FilterConfig;
 use super::limits;
@@ -46,6 +47,8 @@ pub struct Config {
     pub http: ListenerConfig,
     /// The gRPC listener; 127.0.0.1:7334.
     pub grpc: ListenerConfig,
+    /// The listener for health and metrics alone; none.
+    pub admin: AdminConfig,
     /// Keys, and who needs none.
     pub access: AccessConfig,
     /// Settings of TLS.
@@ -78,6 +81,7 @@ impl Default for Config {
             drain_delay_s: 0,
             http: listener(7333),
             grpc: listener(7334),
+            admin: AdminConfig::default(),
             access: AccessConfig::default(),
             tls: TlsConfig::default(),
             log: LogConfig::default(),
@@ -124,6 +128,7 @@ impl Config {
             self.drain_delay_s.number().and_then(|number| delay.out_of_range("drain_delay_s", number)),
             self.store.out_of_range(),
             self.maps.out_of_range(),
+            self.admin.out_of_range(),
             self.access.out_of_range(),
             self.tls.out_of_range(),
             self.threads.out_of_range(),

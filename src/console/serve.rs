@@ -59,6 +59,9 @@ pub struct ServeOptions {
     /// Address of gRPC; port 0 takes a free one [default: 127.0.0.1:7334]
     #[arg(long, value_name = "ADDRESS")]
     grpc_listen: Option<SocketAddr>,
+    /// Address at which health and metrics are served once more, and nothing else, for monitors [default: none]
+    #[arg(long, value_name = "ADDRESS")]
+    admin_listen: Option<SocketAddr>,
     /// A Unix socket to serve gRPC at as well, for clients on this machine (unix:PATH)
     #[arg(long, value_name = "PATH")]
     grpc_socket: Option<PathBuf>,
@@ -154,6 +157,7 @@ impl ServeOptions {
             "data_dir": self.data_dir,
             "http": {"listen": self.http_listen, "socket": self.http_socket},
             "grpc": {"listen": self.grpc_listen, "socket": self.grpc_socket},
+            "admin": {"listen": self.admin_listen},
             "access": {"keys_file": self.keys_file, "open": self.insecure_open.then_some(true)},
             "tls": {"certificate": self.tls_certificate, "key": self.tls_key, "client_ca": self.tls_client_ca},
             "log": {"format": self.log_format, "level": self.log_level},

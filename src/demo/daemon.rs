@@ -52,7 +52,7 @@ impl Daemon {
     }
 
     pub(super) fn serving(&self) -> Serving {
-        Serving { http: self.daemon.http(), grpc: self.daemon.grpc(), tls: false }
+        Serving { http: self.daemon.http(), grpc: self.daemon.grpc(), admin: None, tls: false }
     }
 
     /// Stops the daemon: it completes requests in flight, saves its maps and ends.

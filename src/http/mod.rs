@@ -18,5 +18,5 @@ mod starting;
 mod viewer;
 
 pub use openapi::openapi_json;
-pub use router::router;
-pub use starting::starting;
+pub use router::{admin_router, router};
+pub use starting::{admin_starting, starting};

@@ -19,6 +19,12 @@ pub(super) fn of_operations() -> Router<Adapter> {
     served.fold(Router::new(), |router, (path, handler)| router.route(path, handler))
 }
 
+/// A route for each of what orchestrators and Prometheus ask, and none besides.
+pub(super) fn of_probes() -> Router<Adapter> {
+    let probes = [Operation::Live, Operation::Ready, Operation::Metrics].into_iter().filter_map(served);
+    probes.fold(Router::new(), |router, (path, handler)| router.route(path, handler))
+}
+
 /// The path of an operation and what answers there.
 fn served(operation: Operation) -> Option<(&'static str, MethodRouter<Adapter>)> {
     let route = operation.route()?;

@@ -18,11 +18,20 @@ use mrol_store::OpeningProgress;
 
 /// The routes of a server that is starting.
 pub fn starting(progress: OpeningProgress, access: Access) -> Router {
-    Router::new()
+    let pages =
+        Router::new().route("/", get(viewer::pages::index)).route("/viewer/{file}", get(viewer::pages::file));
+    answering(pages, progress, access)
+}
+
+/// The routes of its listener for health and metrics.
+pub fn admin_starting(progress: OpeningProgress, access: Access) -> Router {
+    answering(Router::new(), progress, access)
+}
+
+fn answering(others: Router<OpeningProgress>, progress: OpeningProgress, access: Access) -> Router {
+    others
         .route("/livez", get(probes::live))
         .route("/readyz", get(ready))
-        .route("/", get(viewer::pages::index))
-        .route("/viewer/{file}", get(viewer::pages::file))
         .fallback(refuse)
         .layer(from_fn_with_state(access, named))
         .with_state(progress)

@@ -14,7 +14,8 @@ pub(super) fn access(config: &Config) -> Result<Access, ServerError> {
     let AccessConfig { keys_file, open, open_metrics, hosts, .. } = &config.access;
     let everybody = || Access::open().at_hosts(hosts.iter().map(String::as_str));
     let others_connect = |address: &SocketAddr| !address.ip().to_canonical().is_loopback();
-    let listeners = [("http", config.http.listen), ("grpc", config.grpc.listen)];
+    let admin = config.admin.listen.map(|address| ("admin", address));
+    let listeners = [("http", config.http.listen), ("grpc", config.grpc.listen)].into_iter().chain(admin);
     let reachable = listeners.into_iter().find(|(_, address)| others_connect(address));
     match (keys_file, reachable) {
         (Some(file), _) => {
@@ -60,5 +61,15 @@ mod tests {
             assert!(refused.contains("access.keys_file") && refused.contains("--insecure-open"), "{refused}");
             assert!(listening(address, address, true).is_ok());
         }
+    }
+
+    #[test]
+    fn health_is_shown_to_other_machines_under_the_same_rules() {
+        let mut config = Config::default();
+        config.admin.listen = Some("127.0.0.1:7335".parse().unwrap());
+        assert!(access(&config).is_ok());
+        config.admin.listen = Some("0.0.0.0:7335".parse().unwrap());
+        let refused = access(&config).unwrap_err().to_string();
+        assert!(refused.contains("0.0.0.0:7335") && refused.contains("admin"), "{refused}");
     }
 }

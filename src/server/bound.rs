@@ -29,10 +29,16 @@ use crate::config::Config;
 use crate::middleware::Middleware;
 use crate::telemetry::{Audit, Metrics, RequestRecorder};
 use crate::{grpc, http};
-use mrol_service::{Gauges, MapService, Observer, ServiceSettings};
+use mrol_service::{Gauges, Limits, MapService, Observer, ServiceSettings};
 
 /// The least time for saving the maps at the end: also who waits for no request wants them saved.
 const SAVING_MIN: Duration = Duration::from_secs(5);
+
+/// Connections of the listener for health and metrics: monitors are few, and each file that they may open is one less
+/// for robots.
+const ADMIN_CONNECTIONS_MAX: usize = 64;
+/// Connections of it besides, where all of those are in use.
+const ADMIN_CONNECTIONS_RESERVED: usize = 16;
 
 /// How long the end of the process may take once everything has been waited for.
 const ENDING_MAX: Duration = Duration::from_secs(5);
@@ -48,6 +54,7 @@ pub struct Server {
     lifecycle: Lifecycle,
     http: TcpSocket,
     grpc: TcpSocket,
+    admin: Option<TcpSocket>,
     http_socket: Option<UnixSocket>,
     grpc_socket: Option<UnixSocket>,
     wanted: Wanted,
@@ -81,14 +88,26 @@ impl Server {
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let wanted = Wanted::default();
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
+        let admin =
+            config.admin.listen.map(|address| TcpSocket::bind(Protocol::Admin, address)).transpose()?;
+        let start = |protocol, socket: &TcpSocket, routes, limits: &Limits| {
+            Starting::serve(protocol, socket, tls.clone(), routes, limits, metrics.clone())
+        };
         let routes = http::starting(wanted.progress().clone(), access.clone());
-        let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
+        let starting = start(Protocol::Http, &http, routes, &config.limits);
+        let admin_starting = admin.as_ref().map(|socket| {
+            let routes = http::admin_starting(wanted.progress().clone(), access.clone());
+            start(Protocol::Admin, socket, routes, &admin_limits(&config.limits))
+        });
         let begin = {
             let progress = wanted.progress().clone();
             move || MapService::begin(settings, &progress)
         };
         let begun = tokio::task::spawn_blocking(begin).await;
         starting.end().await;
+        if let Some(starting) = admin_starting {
+            starting.end().await;
+        }
         let service = begun.map_err(|panic| panicked(&panic))?.map_err(ServerError::Open)?;
         Ok(Self {
             service,
@@ -97,6 +116,7 @@ impl Server {
             tls,
             lifecycle: Lifecycle::default(),
             http,
+            admin,
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
             http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
@@ -113,6 +133,11 @@ impl Server {
     /// Where gRPC is served.
     pub fn grpc_address(&self) -> SocketAddr {
         self.grpc.address
+    }
+
+    /// Where health and metrics are served by themselves, if they are.
+    pub fn admin_address(&self) -> Option<SocketAddr> {
+        self.admin.as_ref().map(|socket| socket.address)
     }
 
     /// The file of the Unix socket where HTTP is served, if there is one.
@@ -163,17 +188,26 @@ impl Server {
         let Self { config, access, tls, service, recorder, lifecycle, wanted, .. } = self;
         let (http_tcp, http_unix, grpc_tcp, grpc_unix) =
             (self.http, self.http_socket, self.grpc, self.grpc_socket);
+        let admin_tcp = self.admin;
         let metrics = recorder.metrics().clone();
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
         let admission = Admission::new(&config.limits, lifecycle.clone());
-        let middleware = Middleware::new(gate, admission.clone(), recorder.clone());
+        let middleware = Middleware::new(gate.clone(), admission.clone(), recorder.clone());
         let (routes, health) = grpc::routes(&middleware, bytes_max)?;
         let router = http::router(&middleware, bytes_max);
-        let endpoint =
-            |protocol, router| Endpoint::new(protocol, router, tls.clone(), &config.limits, metrics.clone());
-        let grpc = endpoint(Protocol::Grpc, routes.into_axum_router());
-        let http = endpoint(Protocol::Http, router);
+        let endpoint = |protocol, router, limits: &Limits| {
+            Endpoint::new(protocol, router, tls.clone(), limits, metrics.clone())
+        };
+        let grpc = endpoint(Protocol::Grpc, routes.into_axum_router(), &config.limits);
+        let http = endpoint(Protocol::Http, router, &config.limits);
+        let admin = {
+            let limits = admin_limits(&config.limits);
+            // With places of its own, so that what fills the main ports does not keep its monitors out.
+            let admission = Admission::new(&limits, lifecycle.clone());
+            let middleware = Middleware::new(gate, admission, recorder.clone());
+            endpoint(Protocol::Admin, http::admin_router(&middleware, bytes_max), &limits)
+        };
 
         let mut shutdown = pin!(shutdown);
         tokio::select! {
@@ -185,7 +219,9 @@ impl Server {
         }
         let mut opening = Opening::begin(service.clone(), wanted, health).await;
         tracing::info!(http = %http_tcp.address, grpc = %grpc_tcp.address, "serving");
-        let mut accepting = accept([(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)]);
+        let admin_sockets = admin_tcp.map(|tcp| (&admin, tcp, None));
+        let sockets = [(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)];
+        let mut accepting = accept(sockets.into_iter().chain(admin_sockets));
         let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
         let looking = tokio::spawn(files.look_after(lifecycle.clone()));
         let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
@@ -213,9 +249,10 @@ impl Server {
         }
         lifecycle.cut();
         http.close();
-        if timeout(CLOSING_MAX, async { tokio::join!(grpc.closed(), http.closed()) }).await.is_err() {
-            grpc.cut();
-            http.cut();
+        admin.close();
+        let closed = async { tokio::join!(grpc.closed(), http.closed(), admin.closed()) };
+        if timeout(CLOSING_MAX, closed).await.is_err() {
+            [grpc, http, admin].iter().for_each(Endpoint::cut);
         }
         // A file system that hangs does not keep the server from ending.
         looking.abort();
@@ -233,7 +270,7 @@ impl Server {
 }
 
 /// Takes connections from now on, at every socket.
-fn accept(sockets: [(&Endpoint, TcpSocket, Option<UnixSocket>); 2]) -> JoinSet<()> {
+fn accept<'a>(sockets: impl Iterator<Item = (&'a Endpoint, TcpSocket, Option<UnixSocket>)>) -> JoinSet<()> {
     let mut accepting = JoinSet::new();
     for (endpoint, tcp, unix) in sockets {
         accepting.spawn(endpoint.clone().accept(Accepting::Tcp(tcp.listener)));
@@ -243,6 +280,15 @@ fn accept(sockets: [(&Endpoint, TcpSocket, Option<UnixSocket>); 2]) -> JoinSet<(
         }
     }
     accepting
+}
+
+/// The limits of the listener for health and metrics: few connections, since few ask.
+fn admin_limits(limits: &Limits) -> Limits {
+    Limits {
+        connections_max: limits.connections_max.min(ADMIN_CONNECTIONS_MAX),
+        connections_reserved: limits.connections_reserved.min(ADMIN_CONNECTIONS_RESERVED),
+        ..limits.clone()
+    }
 }
 
 /// How long saving the maps may take when the server goes down.

@@ -24,7 +24,7 @@ pub struct Daemon {
 /// An address that was in use, so that the protocol listens at a free port instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Taken {
-    /// `http` or `grpc`.
+    /// `http`, `grpc` or `admin`.
     pub protocol: &'static str,
     /// The address.
     pub address: SocketAddr,
@@ -112,6 +112,7 @@ async fn bind(
         let Some(listen) = listen else { return Err(error) };
         match *protocol {
             "http" => config.http.listen = listen,
+            "admin" => config.admin.listen = Some(listen),
             _ => config.grpc.listen = listen,
         }
     }

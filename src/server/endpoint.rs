@@ -115,6 +115,7 @@ impl Endpoint {
             (Protocol::Http, Accepting::Unix(_)) => "http_socket",
             (Protocol::Grpc, Accepting::Tcp(_)) => "grpc",
             (Protocol::Grpc, Accepting::Unix(_)) => "grpc_socket",
+            (Protocol::Admin, _) => "admin",
         }
     }
 

@@ -19,7 +19,7 @@ pub enum ServerError {
     /// An address cannot be listened on.
     #[error("{protocol} cannot listen on {address}: {error}")]
     Listen {
-        /// `http` or `grpc`.
+        /// `http`, `grpc` or `admin`.
         protocol: &'static str,
         /// The address.
         address: SocketAddr,

@@ -45,7 +45,7 @@ impl FailedHandshakes {
 
     fn of(&self, protocol: Protocol) -> &AtomicU64 {
         match protocol {
-            Protocol::Http => &self.http,
+            Protocol::Http | Protocol::Admin => &self.http,
             Protocol::Grpc => &self.grpc,
         }
     }

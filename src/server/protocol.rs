@@ -41,6 +41,8 @@ pub(super) enum Protocol {
     Http,
     /// Over HTTP/2 alone.
     Grpc,
+    /// Health and metrics alone, over HTTP/1 and HTTP/2.
+    Admin,
 }
 
 impl Protocol {
@@ -48,13 +50,14 @@ impl Protocol {
         match self {
             Self::Http => "http",
             Self::Grpc => "grpc",
+            Self::Admin => "admin",
         }
     }
 
     /// Bytes that a client sends before anything else, at least.
     pub(super) fn opening_bytes(self) -> usize {
         match self {
-            Self::Http => 1,
+            Self::Http | Self::Admin => 1,
             Self::Grpc => PREFACE_BYTES,
         }
     }
@@ -62,7 +65,7 @@ impl Protocol {
     /// How long a connection without a request may stay.
     pub(super) fn idle_max(self, limits: &Limits) -> Duration {
         Duration::from_secs_f64(match self {
-            Self::Http => limits.http_idle_max_s,
+            Self::Http | Self::Admin => limits.http_idle_max_s,
             Self::Grpc => limits.grpc_idle_max_s,
         })
     }
@@ -90,7 +93,7 @@ impl Protocol {
             .keep_alive_interval(transport::KEEPALIVE_INTERVAL)
             .keep_alive_timeout(transport::KEEPALIVE_TIMEOUT);
         match self {
-            Self::Http => builder,
+            Self::Http | Self::Admin => builder,
             Self::Grpc => builder.http2_only(),
         }
     }

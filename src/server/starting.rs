@@ -26,13 +26,14 @@ pub(super) struct Starting {
 impl Starting {
     /// Begins to answer at `socket`.
     pub(super) fn serve(
+        protocol: Protocol,
         socket: &TcpSocket,
         tls: Option<Tls>,
         routes: Router,
         limits: &Limits,
         metrics: Metrics,
     ) -> Self {
-        let endpoint = Endpoint::new(Protocol::Http, routes, tls, limits, metrics);
+        let endpoint = Endpoint::new(protocol, routes, tls, limits, metrics);
         let socket = Accepting::Tcp(Arc::clone(&socket.listener));
         let accepting = tokio::spawn(endpoint.clone().accept(socket));
         Self { endpoint, accepting }

@@ -100,7 +100,7 @@ impl Tls {
     pub(super) fn acceptor(&self, protocol: Protocol) -> TlsAcceptor {
         let certificates = self.files.current();
         match protocol {
-            Protocol::Http => certificates.http.clone(),
+            Protocol::Http | Protocol::Admin => certificates.http.clone(),
             Protocol::Grpc => certificates.grpc.clone(),
         }
     }

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+mod admin_listener;
 mod bad_input;
 mod blocks;
 mod callers_gone;

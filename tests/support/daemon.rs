@@ -36,6 +36,7 @@ pub async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> 
 pub struct Daemon {
     pub http: SocketAddr,
     pub grpc: SocketAddr,
+    pub admin: Option<SocketAddr>,
     pub data: TempDir,
     stop: oneshot::Sender<()>,
     running: JoinHandle<Result<(), ServerError>>,
@@ -75,12 +76,12 @@ impl Daemon {
 
     /// Serves; where there are maps, once they are open.
     async fn serve(server: Server, data: TempDir) -> Self {
-        let (http, grpc) = (server.http_address(), server.grpc_address());
+        let (http, grpc, admin) = (server.http_address(), server.grpc_address(), server.admin_address());
         let maps = std::fs::read_dir(data.path().join("maps"));
         let has_maps = maps.is_ok_and(|mut maps| maps.next().is_some()) && !server.is_secured();
         let (stop, stopped) = oneshot::channel();
         let running = tokio::spawn(server.run(async move { drop(stopped.await) }));
-        let daemon = Self { http, grpc, data, stop, running };
+        let daemon = Self { http, grpc, admin, data, stop, running };
         if has_maps {
             wait_until(async || daemon.get("/readyz").await.status() == StatusCode::OK).await;
         }

@@ -85,6 +85,24 @@ async fn metrics_count_by_key_and_are_open_where_the_settings_say_so() {
     assert_eq!(open.get("/v1/maps").await.status(), StatusCode::UNAUTHORIZED);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn the_listener_for_monitors_asks_for_the_same_keys() {
+    let keyring = Keyring::empty();
+    let key = keyring.add("prometheus", Scope::Read, None);
+    let file = keyring.file();
+    let server = Daemon::start_with(|config| {
+        config.access.keys_file = Some(file);
+        config.admin.listen = Some(([127, 0, 0, 1], 0).into());
+    })
+    .await;
+    let url = |path: &str| format!("http://{}{path}", server.admin.unwrap());
+    let status = async |request: reqwest::RequestBuilder| request.send().await.unwrap().status();
+    assert_eq!(status(client().get(url("/livez"))).await, StatusCode::OK);
+    assert_eq!(status(client().get(url("/metrics"))).await, StatusCode::UNAUTHORIZED);
+    assert_eq!(status(client().get(url("/metrics")).bearer_auth(key.reveal())).await, StatusCode::OK);
+    assert_eq!(status(client().get(url("/v1/maps")).bearer_auth(key.reveal())).await, StatusCode::NOT_FOUND);
+}
+
 /// The map that was there gets another name, which a key for some maps does not reach.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_key_for_some_maps_replaces_none() {
