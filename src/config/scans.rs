@@ -73,6 +73,7 @@ impl RobotConfig {
             margin_voxels: self.carve_margin_voxels,
             grazing_deg: self.carve_grazing_deg,
             range_max_m: self.carve_range_max_m,
+            ..CarvingSettings::default()
         }
     }
 

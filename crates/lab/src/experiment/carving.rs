@@ -7,9 +7,12 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::exact_rays::ExactRays;
 use mrol_map::geometry::{Point, Pose, pose_difference};
 use mrol_map::map::{MapSettings, MapSettingsError, MultiResolutionMap, RobotName};
-use mrol_map::mapping::{CarvingSettings, Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol_map::mapping::{
+    CarvingSettings, Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings, ViewpointSettings,
+};
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::VoxelKey;
 use mrol_simulate::{Mover, Scene, SpinningLidar};
@@ -21,6 +24,9 @@ const MIDDLE_M: [f64; 2] = [10.0, 7.0];
 const HEIGHT_M: f64 = 1.0;
 /// After which share of the scans the box is taken away: the robot is 4 m from it then.
 const GONE_AFTER: f64 = 0.55;
+/// Of so many rays one tells a place that is free, and where along it that is.
+const RAYS_APART: usize = 101;
+const PASSED: f64 = 0.9;
 /// Steps of the walker that are no trail yet: he stands beside them.
 const FRESH_STEPS: usize = 3;
 
@@ -53,6 +59,10 @@ pub struct CarvingFigures {
     /// Voxels of walls, floor, ceiling and furniture in a map that does not carve, and how many of them are left in the
     /// one that does.
     pub still_voxels: (usize, usize),
+    /// The same voxels, and those of them through whose centers a viewpoint claims to see.
+    pub seen_through: (usize, usize),
+    /// Places that rays passed, and those of them that are free by the viewpoints.
+    pub free: (usize, usize),
     /// Scans that carved and were accepted, and those that did not carve.
     pub accepted: (usize, usize),
     /// Errors of the poses of both, meters, ascending.
@@ -87,14 +97,31 @@ impl CarvingTrial {
     ///
     /// # Errors
     /// When a setting is out of range, or a scan cannot be mapped.
-    pub fn run(&self, mut done: impl FnMut()) -> Result<CarvingFigures, CarvingTrialError> {
+    pub fn run(&self, done: impl FnMut()) -> Result<CarvingFigures, CarvingTrialError> {
+        Ok(self.run_with(&[(self.carving, None)], done)?.remove(0))
+    }
+
+    /// The same scans, carved by several settings, or by exact rays: what came of each.
+    ///
+    /// # Errors
+    /// As of [`CarvingTrial::run`].
+    pub fn run_with(
+        &self,
+        ways: &[(CarvingSettings, Option<ExactRays>)],
+        mut done: impl FnMut(),
+    ) -> Result<Vec<CarvingFigures>, CarvingTrialError> {
         let hall = Scene::hall(self.seed);
         let movers = self.movers();
-        let (mut with, mut without) = (self.map(Some(self.carving))?, self.map(None)?);
+        let mapper = |&(carving, exact): &(CarvingSettings, _)| {
+            Ok::<_, CarvingTrialError>(CarvingMapper { exact, ..self.map(Some(carving))? })
+        };
+        let with: Result<Vec<_>, _> = ways.iter().map(mapper).collect();
+        let (mut with, mut without) = (with?, self.map(None)?);
         let (mut random, mut other_random) =
             (ChaCha8Rng::seed_from_u64(self.seed), ChaCha8Rng::seed_from_u64(self.seed + 1));
         let mut still = CarvingMapper { at_true_poses: true, ..self.map(None)? };
-        let mut box_voxels = None;
+        let mut box_voxels = vec![None; with.len()];
+        let mut passed_m = Vec::new();
         for step in 0..self.scans {
             let truth = self.pose(step);
             let look = |scene: &Scene, random: &mut ChaCha8Rng| {
@@ -102,38 +129,49 @@ impl CarvingTrial {
                 points.into_iter().filter(|point| point.is_finite()).collect::<Vec<Point>>()
             };
             let points = look(&hall.with_movers(&movers, step), &mut random);
-            still.add(step, &look(&hall, &mut other_random), &truth)?;
-            let before = (step == self.gone_at()).then(|| with.voxels());
-            with.add(step, &points, &truth)?;
-            without.add(step, &points, &truth)?;
-            if let Some(before) = before {
-                box_voxels = Some((self.within(&movers[0], [step - 1], &before), with.voxels()));
+            let standing = look(&hall, &mut other_random);
+            still.add(step, &standing, &truth)?;
+            passed_m.extend(standing.iter().step_by(RAYS_APART).map(|end| passed_by(&truth, end)));
+            for (with, box_voxels) in with.iter_mut().zip(&mut box_voxels) {
+                let before = (step == self.gone_at()).then(|| with.voxels());
+                with.add(step, &points, &truth)?;
+                if let Some(before) = before {
+                    *box_voxels = Some((self.within(&movers[0], [step - 1], &before), with.voxels()));
+                }
             }
+            without.add(step, &points, &truth)?;
             done();
         }
-        let (stands, kept, all) = (still.voxels(), with.voxels(), without.voxels());
+        let (stands, all) = (still.voxels(), without.voxels());
         let ghosts: BTreeSet<_> = all.difference(&stands).copied().collect();
         let last = self.within(&movers[1], self.scans.saturating_sub(FRESH_STEPS)..self.scans, &ghosts);
         let trail = self.within(&movers[1], 0..self.scans, &ghosts);
         let trail: BTreeSet<_> = trail.difference(&last).copied().collect();
         let standing: BTreeSet<_> = stands.intersection(&all).copied().collect();
-        let left = |of: &BTreeSet<VoxelKey>| (of.len(), of.intersection(&kept).count());
         let ascending = |mut errors: Vec<f64>| {
             errors.sort_unstable_by(f64::total_cmp);
             errors
         };
-        // What stands beside the box is no part of it.
-        let (of_box, after) = box_voxels.unwrap_or_default();
-        let of_box: BTreeSet<_> = of_box.difference(&stands).copied().collect();
-        with.carve_times.sort_unstable();
-        Ok(CarvingFigures {
-            box_voxels: (of_box.len(), of_box.intersection(&after).count()),
-            trail_voxels: left(&trail),
-            still_voxels: left(&standing),
-            accepted: (with.errors_m.len(), without.errors_m.len()),
-            errors_m: (ascending(with.errors_m), ascending(without.errors_m)),
-            carve_times: with.carve_times,
-        })
+        let without_m = ascending(without.errors_m);
+        let figures = with.into_iter().zip(box_voxels).map(|(mut with, box_voxels)| {
+            let kept = with.voxels();
+            let left = |of: &BTreeSet<VoxelKey>| (of.len(), of.intersection(&kept).count());
+            // What stands beside the box is no part of it.
+            let (of_box, after) = box_voxels.unwrap_or_default();
+            let of_box: BTreeSet<_> = of_box.difference(&stands).copied().collect();
+            with.carve_times.sort_unstable();
+            CarvingFigures {
+                box_voxels: (of_box.len(), of_box.intersection(&after).count()),
+                trail_voxels: left(&trail),
+                still_voxels: left(&standing),
+                seen_through: with.seen_through(&standing),
+                free: with.free(&passed_m),
+                accepted: (with.errors_m.len(), without_m.len()),
+                errors_m: (ascending(with.errors_m), without_m.clone()),
+                carve_times: with.carve_times,
+            }
+        });
+        Ok(figures.collect())
     }
 
     /// The voxels within a voxel of where `mover` is at one of `steps`.
@@ -161,6 +199,11 @@ impl CarvingTrial {
 
 const LEVELS: u32 = 6;
 
+/// A place that the ray with this end (sensor frame) passed: map frame, meters.
+fn passed_by(map_from_sensor: &Pose, end: &Point) -> [f64; 3] {
+    (map_from_sensor * nalgebra::Point3::from(end.to_f64().coords * PASSED)).into()
+}
+
 /// Why a trial cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CarvingTrialError {
@@ -184,6 +227,8 @@ pub struct CarvingMapper {
     sightings: Sightings,
     settings: MappingSettings,
     at_true_poses: bool,
+    /// Carve by these in the place of the scan's surface.
+    pub exact: Option<ExactRays>,
     /// Errors of the accepted scans' poses, meters.
     pub errors_m: Vec<f64>,
     /// How long each scan's carving took.
@@ -206,8 +251,16 @@ impl CarvingMapper {
             map: MultiResolutionMap::new(settings)?,
             robot: RobotName::new("lidar")?,
             sightings: Sightings::default(),
-            settings: MappingSettings { carving, ..MappingSettings::default() },
+            settings: MappingSettings {
+                carving,
+                viewpoints: ViewpointSettings {
+                    thresholds: carving.unwrap_or_default().thresholds,
+                    ..ViewpointSettings::default()
+                },
+                ..MappingSettings::default()
+            },
             at_true_poses,
+            exact: None,
             errors_m: Vec::new(),
             carve_times: Vec::new(),
             carved: BTreeSet::new(),
@@ -233,12 +286,37 @@ impl CarvingMapper {
         }
         let mut record = mapper.record(&scan, &located, StopSignal::NEVER)?;
         let start = Instant::now();
-        record.carved = mapper.carve(&scan, &located, &record, StopSignal::NEVER)?.voxels;
+        record.carved = match self.exact {
+            None => mapper.carve(&scan, &located, &record, StopSignal::NEVER)?.voxels,
+            Some(exact) => {
+                let occupied = self.map.view().voxels();
+                let pose = &record.pose.map_from_sensor;
+                exact.carve((&occupied, &record.voxels), self.map.lattice(), pose, points)
+            }
+        };
         self.carve_times.push(start.elapsed());
         self.carved.extend(record.carved.iter());
         self.errors_m.push(pose_difference(truth, &located.alignment.map_from_sensor).0);
         self.map.committer().insert_scan(record);
         Ok(true)
+    }
+
+    /// How many voxels there are, and through how many centers a viewpoint claims to see.
+    fn seen_through(&self, voxels: &BTreeSet<VoxelKey>) -> (usize, usize) {
+        let centers_m = voxels.iter().map(|voxel| self.map.lattice().center_m(*voxel, 0));
+        (voxels.len(), self.seen(centers_m))
+    }
+
+    /// How many places there are, and how many of them are free by the viewpoints.
+    fn free(&self, places_m: &[[f64; 3]]) -> (usize, usize) {
+        (places_m.len(), self.seen(places_m.iter().copied()))
+    }
+
+    fn seen(&self, places_m: impl Iterator<Item = [f64; 3]>) -> usize {
+        let view = self.map.view().with_viewpoints();
+        let Some(viewpoints) = view.viewpoints() else { return 0 };
+        let mut cache = viewpoints.cache();
+        places_m.filter(|place_m| cache.is_free(*place_m)).count()
     }
 
     /// All finest voxels of the map.

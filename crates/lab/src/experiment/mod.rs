@@ -4,6 +4,7 @@ pub mod carving;
 pub mod convergence;
 pub mod deskewing;
 pub mod drift;
+pub mod exact_rays;
 pub mod free_space;
 pub mod mapping;
 pub mod rounds;

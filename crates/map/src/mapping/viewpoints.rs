@@ -10,7 +10,8 @@ use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
 use crate::util::StopSignal;
 use crate::visibility::{
-    IMAGE_BYTES_MAX, RangeImage, Sweep, Viewpoint, ViewpointSet, newly_seen_by_rays_m3, newly_seen_m3,
+    IMAGE_BYTES_MAX, RangeImage, Sweep, Thresholds, Viewpoint, ViewpointSet, newly_seen_by_rays_m3,
+    newly_seen_m3,
 };
 
 /// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
@@ -40,6 +41,8 @@ pub struct ViewpointSettings {
     pub newly_seen_standing_m3: f64,
     /// What is further away is seen up to here, meters. 60.
     pub range_max_m: f32,
+    /// What was found by trial: no setting of a server.
+    pub thresholds: Thresholds,
 }
 
 impl Default for ViewpointSettings {
@@ -52,6 +55,7 @@ impl Default for ViewpointSettings {
             unknown_from_known_pose: 0.05,
             newly_seen_standing_m3: 0.15,
             range_max_m: 60.0,
+            thresholds: Thresholds::DEFAULT,
         }
     }
 }
@@ -113,7 +117,7 @@ impl ViewpointSettings {
         if !least.may_be_seen_by(&ends, sweep, map_from_sensor, viewpoints) {
             return None;
         }
-        let image = RangeImage::of_points(&ends, sweep, IMAGE_BYTES_MAX)?;
+        let image = RangeImage::of_points_by(&ends, sweep, IMAGE_BYTES_MAX, &self.thresholds)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown =
             share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.is_free(point));

@@ -4,37 +4,34 @@
 //! is what the sensor saw: a scan that sees something new leaves a [`Viewpoint`], its pose with a small [`RangeImage`]
 //! of how far it saw in each direction. A voxel is free where a viewpoint saw through its center and nothing occupies
 //! it.
+//!
+//! ```text
+//! a scan that is kept as a viewpoint                          a scan that is at hand
+//!
+//! rays --> pixels --> parts of them --> tiles of 8 x 8        rays --> pixels --> hits, joined to a surface
+//! (directions) (imaging)                (image)               (directions)        (absence)
+//!                                         |                                         |
+//! is this place free?      RangeImage::is_free, ViewpointSet  which voxels are gone? ScanSurface::sees_through
+//! nothing there any more?  RangeImage::proves_absent          what hides in gaps?    ScanSurface::widest_gap_m
+//! do two scans agree?      RangeImage::sight                  do two scans agree?    ScanImage::sight
+//! ```
+//!
+//! Rooms from below: `directions` are pixels of a cube around the sensor, an `image` is what is kept of a scan, and
+//! `imaging` makes it of points. `absence` is what a scan proves to be gone, and a `set` has the viewpoints of a
+//! map.
 
-mod coverage;
-mod cube_map;
-mod density;
-mod image_bytes;
-mod image_layout;
-mod nearest_depths;
-mod newly_seen;
-mod range_image;
-mod ray_gaps;
-mod ray_index;
-mod scan_image;
-mod scan_rays;
-mod scan_surface;
+mod absence;
+mod directions;
+mod image;
+mod imaging;
 mod set;
-mod sight;
-mod sweep;
 #[cfg(test)]
 mod tests;
-mod tile;
-mod vectors;
-mod viewpoint;
+mod thresholds;
 
-pub use image_bytes::RangeImageError;
-pub use newly_seen::{newly_seen_by_rays_m3, newly_seen_m3};
-pub use range_image::{AbsenceEvidence, IMAGE_BYTES_MAX, Met, RangeImage};
-pub use ray_index::RayWindow;
-pub use scan_image::ScanImage;
-pub use scan_rays::ScanRays;
-pub use scan_surface::{ScanSurface, SurfaceSettings};
-pub use set::{ViewpointCache, ViewpointSet};
-pub use sight::Sight;
-pub use sweep::Sweep;
-pub use viewpoint::{VIEWPOINT_MEMORY_MAX, Viewpoint};
+pub use absence::{RayWindow, ScanSurface, SurfaceSettings};
+pub use image::{AbsenceEvidence, IMAGE_BYTES_MAX, Met, RangeImage, RangeImageError, Sight};
+pub use imaging::{ScanImage, ScanRays, Sweep};
+pub use set::{VIEWPOINT_MEMORY_MAX, Viewpoint, ViewpointCache, ViewpointSet};
+pub use set::{newly_seen_by_rays_m3, newly_seen_m3};
+pub use thresholds::Thresholds;

@@ -8,6 +8,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::experiment::carving::{CarvingFigures, CarvingMapper, CarvingTrial};
+use crate::experiment::exact_rays::ExactRays;
 use crate::report::folder;
 use crate::workload::Scan;
 use mrol::console::error::CliError;
@@ -17,6 +18,7 @@ use mrol::console::{PlanLayer, plan};
 use mrol_map::map::{LEVELS_DEFAULT, MapSettings};
 use mrol_map::mapping::CarvingSettings;
 use mrol_map::scan::{read_points, scan_files};
+use mrol_map::visibility::Thresholds;
 use mrol_map::voxel::VoxelKey;
 use mrol_simulate::SpinningLidar;
 
@@ -24,6 +26,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol-lab experiment carving
   mrol-lab experiment carving --scans street/ --resolution 0.2 --out results/
+  mrol-lab experiment carving --sensitivity --count 60                            does it matter what each threshold is?
 
 Without --scans a robot with a lidar (64 rings of 1024 points, noise of 1 cm) drives rounds in a hall in which a person walks to
 and fro and a box is taken away; each scan is aligned and carves. Prints which share of the box was gone after the next scan,
@@ -55,6 +58,10 @@ pub(super) struct Carving {
     /// Voxels farther away are not carved
     #[arg(long, value_name = "METERS", default_value_t = CarvingSettings::default().range_max_m)]
     range: f64,
+    /// Map the simulated scans, at their true poses, once for each threshold that is 0.7 and 1.4 times as large, and
+    /// once each with voxels carved that so many exact rays crossed
+    #[arg(long, conflicts_with = "folder")]
+    sensitivity: bool,
     /// Seed of the hall and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -69,24 +76,55 @@ impl Carving {
             margin_voxels: self.margin,
             grazing_deg: self.grazing,
             range_max_m: self.range,
+            ..CarvingSettings::default()
         };
         let carving = carving.checked().map_err(CliError::usage)?;
         match (&self.folder, &self.out) {
             (Some(scans), Some(out)) => self.map_scans(scans, out, carving, output),
+            _ if self.sensitivity => self.vary_thresholds(carving, output),
             _ => self.simulate(carving, output),
         }
     }
 
-    fn simulate(&self, carving: CarvingSettings, output: &Output) -> Result<(), CliError> {
-        let trial = CarvingTrial {
+    fn trial(&self, carving: CarvingSettings, at_true_poses: bool) -> CarvingTrial {
+        CarvingTrial {
             scans: self.count.into(),
             scans_a_round: 50,
             resolution_m: self.resolution,
             lidar: SpinningLidar { rings: 64, azimuths: 1024, ..SpinningLidar::default() },
             carving,
-            at_true_poses: false,
+            at_true_poses,
             seed: self.seed,
-        };
+        }
+    }
+
+    fn vary_thresholds(&self, carving: CarvingSettings, output: &Output) -> Result<(), CliError> {
+        let usual = Thresholds::DEFAULT;
+        let mut rows = vec![("as they are", "", 1.0, usual)];
+        for (name, unit, _) in usual.rows() {
+            let scaled = FACTORS.map(|factor| Some((name, unit, factor, usual.scaled(name, factor)?)));
+            rows.extend(scaled.into_iter().flatten());
+        }
+        let by = |thresholds| (CarvingSettings { thresholds, ..carving }, None);
+        let mut ways: Vec<_> = rows.iter().map(|(.., thresholds)| by(*thresholds)).collect();
+        for rays_min in EXACT_RAYS {
+            let margin_voxels = self.margin as i32;
+            let exact = ExactRays { rays_min, margin_voxels, range_max_m: self.range };
+            rows.push(("exact rays, at least", "rays", rays_min as f32, usual));
+            ways.push((carving, Some(exact)));
+        }
+        let trial = self.trial(carving, true);
+        let bar = output.clone().with_bar(trial.scans);
+        let figures = trial.run_with(&ways, || bar.step()).map_err(CliError::failed)?;
+        bar.clear_bar();
+        for ((name, unit, factor, _), figures) in rows.iter().zip(&figures) {
+            output.print(&Varied::of(name, unit, *factor, figures))?;
+        }
+        Ok(())
+    }
+
+    fn simulate(&self, carving: CarvingSettings, output: &Output) -> Result<(), CliError> {
+        let trial = self.trial(carving, false);
         let bar = output.clone().with_bar(trial.scans);
         let figures = trial.run(|| bar.step()).map_err(CliError::failed)?;
         bar.clear_bar();
@@ -145,6 +183,54 @@ fn middle(values: &[f64]) -> f64 {
 /// The median of times.
 fn milliseconds(times: &[Duration]) -> f64 {
     middle(&times.iter().map(|time| time.as_secs_f64() * 1e3).collect::<Vec<_>>())
+}
+
+/// How many times as large each threshold is tried.
+const FACTORS: [f32; 2] = [0.7, 1.4];
+/// How many exact rays carve a voxel, beside them.
+const EXACT_RAYS: [u32; 3] = [1, 3, 10];
+
+/// What came of the simulated scans with one threshold changed: shares.
+#[derive(Serialize)]
+struct Varied {
+    threshold: &'static str,
+    unit: &'static str,
+    factor: f32,
+    box_gone: f64,
+    trail_gone: f64,
+    still_kept: f64,
+    free: f64,
+    seen_through: f64,
+}
+
+impl Varied {
+    fn of(threshold: &'static str, unit: &'static str, factor: f32, figures: &CarvingFigures) -> Self {
+        let share = |(all, of): (usize, usize)| of as f64 / all.max(1) as f64;
+        Self {
+            threshold,
+            unit,
+            factor,
+            box_gone: 1.0 - share(figures.box_voxels),
+            trail_gone: 1.0 - share(figures.trail_voxels),
+            still_kept: share(figures.still_voxels),
+            free: share(figures.free),
+            seen_through: share(figures.seen_through),
+        }
+    }
+}
+
+impl Display for Varied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { threshold, factor, .. } = self;
+        let [gone, trail, kept, free, through] =
+            [self.box_gone, self.trail_gone, self.still_kept, self.free, self.seen_through]
+                .map(|share| share * 100.0);
+        write!(
+            f,
+            "{threshold:<22} x {factor:.1}: box gone {gone:6.2} %, trail gone {trail:6.2} %, kept {kept:7.3} %, free {free:6.2} %, \
+             seen through what stands {through:6.3} %"
+        )
+    }
 }
 
 /// What came of the simulated scans; of pairs, with carving first.

@@ -11,12 +11,6 @@ use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
 
 /// Blocks of voxels that are looked at between two looks at the stop signal.
 const BLOCKS_PER_STOP_CHECK: usize = 16;
-/// Samples of a surface are so much closer to each other than its margins are wide, since they lie askew to the voxels.
-const SAMPLE_SHARE: f64 = 0.7;
-
-/// How far from each other the points of a scan may lie, in voxels, where it carves: what is thicker than that was met
-/// by one.
-const GAP_MAX_VOXELS: f64 = 1.5;
 
 /// What a scan saw through.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -63,34 +57,44 @@ impl CarvingScan<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Carving, MappingError> {
         let resolution_m = map.lattice().resolution_m(0);
+        let thresholds = settings.thresholds;
+        let sample_step = f64::from(thresholds.sample_step);
         let surface = SurfaceSettings {
             grazing_rad: settings.grazing_deg.to_radians() as f32,
             noise_m: resolution_m as f32,
-            spacing_m: (SAMPLE_SHARE * resolution_m * f64::from(2 * settings.margin_voxels + 1)) as f32,
+            spacing_m: (sample_step * resolution_m * f64::from(2 * settings.margin_voxels + 1)) as f32,
+            thresholds,
         };
         let surface = ScanSurface::of(self.rays, surface);
         let region = surface.as_ref().and_then(|surface| self.seen_region(surface, settings));
         let (Some(surface), Some(region)) = (surface, region) else { return Ok(Carving::default()) };
         let (occupied, revision) = occupied_in(map, &region, stop);
         let solid = self.solid(&surface, map.lattice(), settings);
-        let sight = Sight {
+        let view = CarvingView {
             surface: &surface,
             solid: &solid,
             lattice: map.lattice(),
             sensor_from_map: self.record.pose.map_from_sensor.inverse(),
             radius_m: (resolution_m * 3f64.sqrt() / 2.0 + self.moved_m) as f32,
-            gap_max_m: (GAP_MAX_VOXELS * resolution_m) as f32,
+            gap_max_m: (f64::from(thresholds.carved_gap_max) * resolution_m) as f32,
             settings,
         };
         let candidates = occupied.difference(&solid);
         let seen_through = |&(block, ref mask): &(VoxelKey, BlockMask)| {
-            let sight = &sight;
-            mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| sight.sees_through(*voxel))
+            let view = &view;
+            mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| view.sees_through(*voxel))
         };
         let missed: VoxelSet =
             stop.paced(candidates.blocks(), BLOCKS_PER_STOP_CHECK).flat_map(seen_through).collect();
         let map_from_sensor = &self.record.pose.map_from_sensor;
-        let thin = ThinThings::among(&candidates, &surface, map.lattice(), map_from_sensor, sight.radius_m);
+        let thin = ThinThings::among(
+            &candidates,
+            &surface,
+            map.lattice(),
+            map_from_sensor,
+            view.radius_m,
+            &thresholds,
+        );
         let gone = |&(block, ref mask): &(VoxelKey, BlockMask)| {
             let thin = &thin;
             mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| !thin.may_be_at(*voxel))
@@ -136,7 +140,7 @@ fn occupied_in(map: &MultiResolutionMap, region: &Region, stop: StopSignal<'_>) 
 }
 
 /// What a scan sees of voxels.
-struct Sight<'a> {
+struct CarvingView<'a> {
     surface: &'a ScanSurface,
     solid: &'a VoxelSet,
     lattice: &'a Lattice,
@@ -148,7 +152,7 @@ struct Sight<'a> {
     settings: &'a CarvingSettings,
 }
 
-impl Sight<'_> {
+impl CarvingView<'_> {
     fn sees_through(&self, voxel: VoxelKey) -> bool {
         let center_m = nalgebra::Point3::from(self.lattice.center_m(voxel, 0));
         let offset = self.sensor_from_map * center_m;

@@ -1,5 +1,7 @@
 //! Which voxels a scan carves.
 
+use crate::visibility::Thresholds;
+
 /// Widest margin, voxels.
 pub const CARVING_MARGIN_MAX: u32 = 8;
 
@@ -22,11 +24,13 @@ pub struct CarvingSettings {
     /// Voxels farther from the sensor than this are not carved, meters: a pose that is a tenth of a degree off moves
     /// what is 20 m away by 3.5 cm. 20.
     pub range_max_m: f64,
+    /// What was found by trial: no setting of a robot.
+    pub thresholds: Thresholds,
 }
 
 impl Default for CarvingSettings {
     fn default() -> Self {
-        Self { margin_voxels: 1, grazing_deg: 8.0, range_max_m: 20.0 }
+        Self { margin_voxels: 1, grazing_deg: 8.0, range_max_m: 20.0, thresholds: Thresholds::DEFAULT }
     }
 }
 
@@ -52,7 +56,7 @@ impl CarvingSettings {
     /// # Errors
     /// Names what is out of range.
     pub fn checked(self) -> Result<Self, CarvingSettingsError> {
-        let Self { margin_voxels, grazing_deg, range_max_m } = self;
+        let Self { margin_voxels, grazing_deg, range_max_m, .. } = self;
         if !(1..=CARVING_MARGIN_MAX).contains(&margin_voxels) {
             return Err(CarvingSettingsError::Margin(margin_voxels));
         }

@@ -4,20 +4,14 @@ use hashbrown::HashSet;
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Point, Pose};
-use crate::visibility::{RayWindow, ScanSurface};
+use crate::visibility::{RayWindow, ScanSurface, Thresholds};
 use crate::voxel::{Lattice, LatticeFromPoints, VoxelKey, VoxelSet};
 
 /// Things whose voxels lie side by side in so many or more, across the view, are at least as thick as what the rays of
 /// a scan that carves cannot miss.
 const WIDE: usize = 4;
-/// How far rays may lie from each other across things of one to three voxels, in voxels. What fills one or two may be
-/// as thin as it likes: what is thicker than this was met.
-const GAPS_MAX: [f64; WIDE - 1] = [0.2, 0.2, 0.6];
 /// How much deeper what lies beside a voxel may be, in voxels: nearest first.
 const ASKEW: [i32; 7] = [0, -1, 1, -2, 2, -3, 3];
-/// How far along a thing rays are looked for that would have met it, voxels to either side.
-const LENGTH: usize = 3;
-
 /// Voxels that a scan saw through, some of which may hold things thinner than they are.
 ///
 /// A pole or the edge of a table fills a small part of its voxels. Rays that pass these on both sides say nothing of it
@@ -32,6 +26,11 @@ pub(super) struct ThinThings<'a> {
     sensor_from_map: Pose,
     origin: Point3<f64>,
     radius_m: f32,
+    /// How far rays may lie from each other across things of one voxel and more, voxels: what fills one or two may be
+    /// as thin as it likes, and what is thicker than this was met.
+    gaps_max: [f64; WIDE - 1],
+    /// How far along a thing rays are looked for that would have met it, voxels to either side.
+    length: f64,
 }
 
 impl<'a> ThinThings<'a> {
@@ -42,10 +41,14 @@ impl<'a> ThinThings<'a> {
         lattice: &'a Lattice,
         map_from_sensor: &Pose,
         radius_m: f32,
+        thresholds: &Thresholds,
     ) -> Self {
         let (from_map, sensor_from_map) = (lattice.from_map(), map_from_sensor.inverse());
         let origin = map_from_sensor.translation.vector.into();
-        Self { not_met, surface, lattice, from_map, sensor_from_map, origin, radius_m }
+        let Thresholds { thin_gap_max_1, thin_gap_max_2, thin_gap_max_3, thin_length, .. } = *thresholds;
+        let gaps_max = [thin_gap_max_1, thin_gap_max_2, thin_gap_max_3].map(f64::from);
+        let length = f64::from(thin_length);
+        Self { not_met, surface, lattice, from_map, sensor_from_map, origin, radius_m, gaps_max, length }
     }
 
     /// True of a voxel that may hold a thing which no ray could meet.
@@ -57,14 +60,14 @@ impl<'a> ThinThings<'a> {
         let across = [right, right.cross(&ray)];
         let widths = across.map(|axis| self.width(&center, &axis, &ray));
         (0..2).any(|i| {
-            let Some(gap_max) = GAPS_MAX.get(widths[i] - 1) else { return false };
+            let Some(gap_max) = self.gaps_max.get(widths[i] - 1) else { return false };
             let resolution_m = self.lattice.resolution_m(0);
             let axes = [across[i], across[1 - i]];
             let window = RayWindow {
                 offset: (self.sensor_from_map * center).coords.map(|c| c as f32).into(),
                 radius_m: self.radius_m,
                 across: axes.map(|axis| (self.sensor_from_map.rotation * axis).map(|c| c as f32).into()),
-                half_m: [resolution_m / 2.0, resolution_m * (widths[1 - i].min(LENGTH) as f64 - 0.5)]
+                half_m: [resolution_m / 2.0, resolution_m * ((widths[1 - i] as f64).min(self.length) - 0.5)]
                     .map(|half_m| half_m as f32),
             };
             f64::from(self.surface.widest_gap_m(window)) > gap_max * resolution_m

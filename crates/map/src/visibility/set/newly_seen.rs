@@ -1,9 +1,9 @@
 //! How much of space is newly seen: by a viewpoint, or by the rays of a scan.
 
-use super::cube_map::{CubeMap, FACES, Projection};
-use super::vectors::norm;
 use super::viewpoint::Viewpoint;
 use crate::geometry::Pose;
+use crate::visibility::directions::norm;
+use crate::visibility::directions::{CubeMap, FACES, Projection};
 
 /// Where along a ray it is asked whether it was free before, and where the part of the ray ends that the answer stands
 /// for.

@@ -1,17 +1,9 @@
 //! Nearest depths: how deep the nearest point lies in each pixel of a cube map, and which pixels points tell enough of.
 
-use super::cube_map::{CubeMap, Pixel, Projection};
-use super::tile::TILE_PIXELS;
+use crate::visibility::directions::{CubeMap, Pixel, Projection};
+use crate::visibility::image::TILE_PIXELS;
+use crate::visibility::thresholds::Thresholds;
 
-/// Widest part of a pixel of which a point tells, as the side of a square at depth 1: 1.4 degrees. What lies between
-/// points is not looked at.
-pub(super) const SPACING_MAX: f32 = 0.025;
-/// How far from each other two points may lie that tell of what is between them, beside or above each other: 2.9
-/// degrees.
-const GAP_MAX: f32 = 2.0 * SPACING_MAX;
-
-/// Scans whose points lie farther from each other as a rule tell less: 5 degrees.
-const SPARSE: f32 = 0.09;
 /// What may be lost where a number of parts is computed.
 const ROUNDING: f32 = 0.01;
 
@@ -26,6 +18,7 @@ pub(super) struct NearestDepths {
     depths_m: Vec<f32>,
     /// Of each tile of the map: whether some point lies in it.
     is_touched: Vec<bool>,
+    thresholds: Thresholds,
 }
 
 /// How deep the pixels of a tile were seen, meters; none of those that were not.
@@ -33,12 +26,13 @@ pub(super) type SeenTile = [Option<f32>; TILE_PIXELS];
 
 impl NearestDepths {
     /// Of points at `offsets` from the sensor.
-    pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
-        let parts = (map.pitch() / SPACING_MAX).ceil().max(1.0) as usize;
+    pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]], thresholds: &Thresholds) -> Self {
+        let thresholds = *thresholds;
+        let parts = (map.pitch() / thresholds.spacing_max).ceil().max(1.0) as usize;
         let map_of_parts = CubeMap::new(map.tiles() * parts);
         let depths_m = vec![f32::INFINITY; map_of_parts.tiles_of_all_faces() * TILE_PIXELS];
         let is_touched = vec![false; map.tiles_of_all_faces()];
-        let mut depths = Self { map, parts, map_of_parts, depths_m, is_touched };
+        let mut depths = Self { map, parts, map_of_parts, depths_m, is_touched, thresholds };
         for Projection { face, pixel, depth_m } in offsets.iter().filter_map(|&it| map_of_parts.project(it)) {
             let part = depths.at((face, pixel));
             depths.depths_m[part] = depths.depths_m[part].min(depth_m);
@@ -66,7 +60,7 @@ impl NearestDepths {
     /// other as a rule, too far for that, all parts have to be seen.
     pub(super) fn seen_tiles(&self, spacing: f32) -> Vec<SeenTile> {
         let all = self.parts * self.parts;
-        let least = if spacing <= SPARSE { all.div_ceil(2) } else { all };
+        let least = if spacing <= self.thresholds.sparse { all.div_ceil(2) } else { all };
         let mut tiles = vec![[None; TILE_PIXELS]; self.map.tiles_of_all_faces()];
         for (face, pixel) in self.map.all_pixels() {
             let (tile, place) = self.map.place(face, pixel);
@@ -99,7 +93,8 @@ impl NearestDepths {
 
     fn seen_between_m(&self, part: Pixel, [right, up]: [isize; 2]) -> Option<f32> {
         let part_rad = self.map_of_parts.pitch() * self.map_of_parts.angle_of_step(part.1, [right, up]);
-        let steps = (GAP_MAX / part_rad + ROUNDING) as isize;
+        // Two points tell of what is between them that lie at most two of the widest parts from each other.
+        let steps = (2.0 * self.thresholds.spacing_max / part_rad + ROUNDING) as isize;
         let point_m = |step: isize| self.point_m(self.map_of_parts.beside(part, [right * step, up * step])?);
         let (before, before_m) = (1..steps).find_map(|step| Some((step, point_m(-step)?)))?;
         let after_m = (1..=steps - before).find_map(point_m)?;

@@ -1,36 +1,36 @@
 //! Density: how far from each other the points of a scan lie, as they are seen from the sensor.
 
-use super::cube_map::{CubeMap, FACES, TILE_SIDE};
+use crate::visibility::directions::{CubeMap, FACES, TILE_SIDE};
+use crate::visibility::thresholds::Thresholds;
 
 /// Tiles along the side of a face, finest first: pixels of 0.28 to 5.6 degrees.
 const TILES: [usize; 11] = [40, 32, 25, 20, 16, 13, 10, 8, 6, 4, 2];
 /// Tiles along the side of a face with which it is found out how fine pixels can be.
 const TILES_AT_FIRST: usize = 10;
-/// Largest share of the seen pixels beside which others are not seen though some behind these are.
-const GAPS_MAX: f64 = 0.05;
-/// What is farther apart than this is no gap between points of one surface, as the side of a square at depth 1: 8
-/// degrees.
-const GAP_MAX: f32 = 0.14;
 const _: () = assert!(TILE_SIDE * TILES[0] < 1 << 12, "all pixels have a number");
 
 /// How densely the points of a scan lie.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PointDensity {
+pub(in crate::visibility) struct PointDensity {
     /// The finest pixels that leave few gaps of two or more of them between the points: finer ones would be a sieve.
-    pub(super) map: CubeMap,
+    pub(in crate::visibility) map: CubeMap,
     /// How far from each other the points lie as a rule, in the direction in which that is farther, as the side of a
     /// square at depth 1: one pixel to two.
-    pub(super) spacing: f32,
+    pub(in crate::visibility) spacing: f32,
 }
 
 impl PointDensity {
     /// The density of points at `offsets` from the sensor; none where none has a direction.
-    pub(super) fn of(offsets: &[[f32; 3]]) -> Option<Self> {
-        Self::no_finer_than(TILES[0], offsets)
+    pub(in crate::visibility) fn of(offsets: &[[f32; 3]], thresholds: &Thresholds) -> Option<Self> {
+        Self::no_finer_than(TILES[0], offsets, thresholds)
     }
 
     /// The same, where pixels are of no use that are finer than those of so many tiles along a face.
-    pub(super) fn no_finer_than(finest: usize, offsets: &[[f32; 3]]) -> Option<Self> {
+    pub(in crate::visibility) fn no_finer_than(
+        finest: usize,
+        offsets: &[[f32; 3]],
+        thresholds: &Thresholds,
+    ) -> Option<Self> {
         let at_first = SeenPixels::of(CubeMap::new(TILES_AT_FIRST), offsets);
         if at_first.count == 0 {
             return None;
@@ -41,8 +41,8 @@ impl PointDensity {
         let candidates = TILES.iter().filter(|&&tiles| tiles <= tiles_max.min(finest).max(coarsest));
         let mut seen = candidates.map(|&tiles| SeenPixels::of(CubeMap::new(tiles), offsets));
         seen.find_map(|seen| {
-            let Gaps { of_one, wider } = seen.gaps();
-            let is_fit = seen.map.tiles() == coarsest || wider <= GAPS_MAX;
+            let Gaps { of_one, wider } = seen.gaps(thresholds.one_surface_max);
+            let is_fit = seen.map.tiles() == coarsest || wider <= f64::from(thresholds.sieve_share_max);
             // Rings one and a half pixels apart leave a gap of one in every second place.
             is_fit.then(|| Self { map: seen.map, spacing: seen.map.pitch() * (1.0 + of_one as f32) })
         })
@@ -75,9 +75,10 @@ impl SeenPixels {
         seen
     }
 
-    fn gaps(&self) -> Gaps {
+    /// Gaps, of which those as wide as `most` or wider are none between points of one surface.
+    fn gaps(&self, most: f32) -> Gaps {
         let side = self.map.pixels();
-        let most = (GAP_MAX / self.map.pitch()) as usize;
+        let most = (most / self.map.pitch()) as usize;
         let (mut of_one, mut wider) = ([0usize; 2], 0);
         let mut note = |direction: usize, before: Option<usize>, at: usize| {
             let not_seen = before.map_or(0, |before| at - before - 1);
@@ -121,7 +122,7 @@ mod tests {
     #[test]
     fn points_lie_as_far_apart_as_their_rings() {
         for (count, apart_deg) in [(64, 0.4), (32, 1.0), (16, 2.0), (8, 4.0)] {
-            let density = PointDensity::of(&rings(count, apart_deg)).unwrap();
+            let density = PointDensity::of(&rings(count, apart_deg), &Thresholds::DEFAULT).unwrap();
             let spacing_deg = density.spacing.to_degrees();
             assert!(
                 (0.9 * apart_deg..1.6 * apart_deg).contains(&spacing_deg),
@@ -134,12 +135,15 @@ mod tests {
     fn points_sent_several_times_lie_no_closer() {
         let once = rings(16, 2.0);
         let four_times: Vec<_> = (0..4).flat_map(|_| once.iter().copied()).collect();
-        assert_eq!(PointDensity::of(&once), PointDensity::of(&four_times));
+        assert_eq!(
+            PointDensity::of(&once, &Thresholds::DEFAULT),
+            PointDensity::of(&four_times, &Thresholds::DEFAULT)
+        );
     }
 
     #[test]
     fn the_sensors_own_place_has_no_density() {
-        assert_eq!(PointDensity::of(&[]), None);
-        assert_eq!(PointDensity::of(&[[0.0; 3]]), None);
+        assert_eq!(PointDensity::of(&[], &Thresholds::DEFAULT), None);
+        assert_eq!(PointDensity::of(&[[0.0; 3]], &Thresholds::DEFAULT), None);
     }
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::coverage::{CoverageIndex, Slot};
-use super::range_image::AbsenceEvidence;
 use super::viewpoint::Viewpoint;
 use crate::geometry::{Pose, pose_difference};
 use crate::util::Digest;
+use crate::visibility::image::AbsenceEvidence;
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of what each covers.
 #[derive(Clone, Default)]
@@ -137,7 +137,7 @@ impl ViewpointSet {
     /// True where a viewpoint of a scan after `revision` proves that nothing is at `point_m`, see
     /// [`RangeImage::proves_absent`].
     ///
-    /// [`RangeImage::proves_absent`]: super::RangeImage::proves_absent
+    /// [`RangeImage::proves_absent`]: crate::visibility::RangeImage::proves_absent
     pub fn later_proves_absent(&self, point_m: [f64; 3], least: AbsenceEvidence, revision: u64) -> bool {
         let candidates =
             self.index.around(point_m).filter_map(|slot| self.slots.get(slot as usize)?.as_ref());

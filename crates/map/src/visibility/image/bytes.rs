@@ -1,10 +1,10 @@
 //! The bytes of a range image, as it is stored.
 
-use super::cube_map::CubeMap;
-use super::image_layout::{HEAD_BYTES, stored_bytes};
-use super::nearest_depths::SPACING_MAX;
-use super::range_image::{DEPTH_MAX, NOT_SEEN, RangeImage, Rays};
+use super::layout::{HEAD_BYTES, stored_bytes};
+use super::range_image::{DEPTH_MAX, NOT_SEEN, RangeImage, RaySpacing};
 use super::tile::{TILE_BYTES, Tile};
+use crate::visibility::directions::CubeMap;
+use crate::visibility::thresholds::Thresholds;
 
 /// Says in an image's first byte that its head tells how the rays lay. The first images did not.
 const TELLS_RAYS: u8 = 0x80;
@@ -82,9 +82,9 @@ impl RangeImage {
         let (unit_m, rest) = number_from(rest).ok_or_else(|| short.clone())?;
         let tells_rays = first & TELLS_RAYS != 0;
         let (rays, rest) = if tells_rays {
-            Rays::from_bytes(rest).ok_or_else(|| short.clone())?
+            RaySpacing::from_bytes(rest).ok_or_else(|| short.clone())?
         } else {
-            (Rays::NOT_TOLD, rest)
+            (RaySpacing::NOT_TOLD, rest)
         };
         let tells_open = tells_rays && first & TELLS_OPEN != 0;
         let (open_m, rest) = if tells_open { number_from(rest).ok_or(short)? } else { (f32::INFINITY, rest) };
@@ -95,7 +95,7 @@ impl RangeImage {
         if !(unit_m > 0.0 && (unit_m * DEPTH_MAX).is_finite()) {
             return Err(RangeImageError::Unit(unit_m));
         }
-        let Rays { moved_m, spacing } = rays;
+        let RaySpacing { moved_m, spacing } = rays;
         if !(moved_m >= 0.0 && moved_m.is_finite() && spacing >= 0.0 && spacing.is_finite()) {
             return Err(RangeImageError::Rays(moved_m, spacing));
         }
@@ -121,9 +121,9 @@ impl RangeImage {
     }
 }
 
-impl Rays {
+impl RaySpacing {
     /// What is taken of the first images: a sensor that stood, and rays as far apart as they may lie in a pixel.
-    const NOT_TOLD: Self = Self { moved_m: 0.0, spacing: SPACING_MAX };
+    const NOT_TOLD: Self = Self { moved_m: 0.0, spacing: Thresholds::DEFAULT.spacing_max };
 
     fn from_bytes(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (moved_m, rest) = number_from(bytes)?;

@@ -1,15 +1,12 @@
 //! The surface that a scan shows: its points, and which of them lie on one surface.
 
-use super::cube_map::{CubeMap, FACES, Pixel, Projection};
-use super::density::PointDensity;
 use super::ray_index::{Ball, RayIndex, RayWindow};
-use super::scan_rays::ScanRays;
-use super::vectors::{across, between, distance, norm};
+use crate::visibility::directions::{CubeMap, FACES, Pixel, Projection};
+use crate::visibility::directions::{across, between, distance, norm};
+use crate::visibility::imaging::PointDensity;
+use crate::visibility::imaging::ScanRays;
+use crate::visibility::thresholds::Thresholds;
 
-/// Points that are farther apart than so many samples say nothing of what is between them.
-const SAMPLES_MAX: f32 = 32.0;
-/// Balls nearer than so many of their radii are not seen through: they would be looked at in too many directions.
-const NEAREST: f32 = 4.0;
 /// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both
 /// meet, and for where pixels are smallest, at the corners of the cube.
 const FILLINGS: usize = 3;
@@ -28,6 +25,8 @@ pub struct SurfaceSettings {
     pub noise_m: f32,
     /// Largest distance between two neighboring samples of the surface, meters.
     pub spacing_m: f32,
+    /// What was found by trial.
+    pub thresholds: Thresholds,
 }
 
 /// The surface that a scan shows, as it is seen from the sensor: on the six faces of a cube around it, the nearest
@@ -70,7 +69,7 @@ impl ScanSurface {
     /// The surface of a scan with these rays; none of a scan without any.
     pub fn of(rays: ScanRays<'_>, settings: SurfaceSettings) -> Option<Self> {
         let mut offsets: Vec<_> = rays.all().map(|point| point.xyz()).collect();
-        let PointDensity { map, .. } = PointDensity::of(&offsets)?;
+        let PointDensity { map, .. } = PointDensity::of(&offsets, &settings.thresholds)?;
         let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
         let index = RayIndex::of(map, &[]);
         let mut surface = Self { map, settings, places, hits: Vec::new(), rays: index };
@@ -159,9 +158,9 @@ impl ScanSurface {
         let scale = near.distance_m / far.distance_m;
         let beside_near = far.offset.map(|c| c * scale);
         let across_m = distance(near.offset, beside_near);
-        let SurfaceSettings { grazing_rad, noise_m, spacing_m } = self.settings;
+        let SurfaceSettings { grazing_rad, noise_m, spacing_m, thresholds } = self.settings;
         far.distance_m - near.distance_m <= across_m / grazing_rad.tan() + noise_m
-            && distance(near.offset, far.offset) <= SAMPLES_MAX * spacing_m
+            && distance(near.offset, far.offset) <= thresholds.patch_max * spacing_m
     }
 
     /// The ends of the directions that were seen, or where they are `range_m` from the sensor if that is nearer:
@@ -242,7 +241,8 @@ impl ScanSurface {
     pub fn sees_through(&self, offset: [f32; 3], radius_m: f32, gap_max_m: f32) -> bool {
         let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
         let (distance_m, pixel_m) = (norm(offset), depth_m * self.map.pitch());
-        if distance_m <= NEAREST * radius_m {
+        let thresholds = &self.settings.thresholds;
+        if distance_m <= thresholds.ball_distance_min * radius_m {
             return false;
         }
         let window_m = radius_m + pixel_m;
@@ -259,7 +259,7 @@ impl ScanSurface {
                 seen.is_some_and(|hit| hit.distance_m > distance_m + radius_m || !(is_within || hit.is_rim))
             })
         });
-        ends_beyond && self.rays.pass(Ball { offset, radius_m }, gap_max_m / 2.0)
+        ends_beyond && self.rays.pass(Ball { offset, radius_m }, gap_max_m / 2.0, thresholds)
     }
 
     /// The widest gap between rays across a window, see [`RayWindow`], meters.
@@ -287,7 +287,8 @@ mod tests {
     use super::*;
     use crate::geometry::Point;
 
-    const SETTINGS: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0.1, spacing_m: 0.2 };
+    const SETTINGS: SurfaceSettings =
+        SurfaceSettings { grazing_rad: 0.14, noise_m: 0.1, spacing_m: 0.2, thresholds: Thresholds::DEFAULT };
 
     /// Rays half a degree apart about the x axis that end so far away as `end_m` says of their angles to the side and
     /// up, degrees; with those that it says nothing of.

@@ -1,6 +1,6 @@
 //! Sight: what a scan tells of a point, from its image alone.
 
-use super::cube_map::{CubeMap, Pixel, Projection};
+use crate::visibility::directions::{CubeMap, Pixel, Projection};
 
 /// What a scan tells of a point, by what it saw in the directions around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,7 +22,7 @@ const BESIDE: isize = 1;
 /// The sight of the point at `offset` from the sensor, in its frame, by an image whose pixels were seen to the depths
 /// that `depth_m` tells. Depths that differ by `tolerance_m` or less are the same.
 #[inline(always)]
-pub(super) fn sight(
+pub(in crate::visibility) fn sight(
     map: CubeMap,
     depth_m: impl Fn(Pixel) -> Option<f32>,
     offset: [f32; 3],

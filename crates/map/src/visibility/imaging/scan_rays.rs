@@ -21,7 +21,7 @@ impl<'a> ScanRays<'a> {
     }
 
     /// All ends.
-    pub(super) fn all(self) -> impl Iterator<Item = &'a Point> {
+    pub(in crate::visibility) fn all(self) -> impl Iterator<Item = &'a Point> {
         self.met.iter().chain(self.beyond).chain(self.no_returns)
     }
 }

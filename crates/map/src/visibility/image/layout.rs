@@ -1,7 +1,7 @@
 //! How many bytes of a range image tell what.
 
-use super::cube_map::CubeMap;
 use super::tile::TILE_BYTES;
+use crate::visibility::directions::CubeMap;
 
 /// Bytes of an image before its tiles: how many there are along a side, the unit of depths, and how the rays lay.
 pub(super) const HEAD_BYTES: usize = 1 + 3 * 4;
@@ -12,6 +12,6 @@ pub(super) fn stored_bytes(map: CubeMap, kept: usize) -> usize {
 }
 
 /// Tiles that an image of at most `bytes` bytes can keep.
-pub(super) fn tiles_max(map: CubeMap, bytes: usize) -> usize {
+pub(in crate::visibility) fn tiles_max(map: CubeMap, bytes: usize) -> usize {
     bytes.saturating_sub(stored_bytes(map, 0)) / TILE_BYTES
 }

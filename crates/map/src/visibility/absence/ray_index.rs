@@ -1,15 +1,12 @@
 //! The rays of a scan by where they ran.
 
-use super::cube_map::{CubeMap, FACES, Projection};
-use super::vectors::{across, dot, norm};
+use crate::visibility::directions::{CubeMap, FACES, Projection};
+use crate::visibility::directions::{across, dot, norm};
+use crate::visibility::thresholds::Thresholds;
 
 /// Columns, and rows, of parts of a pixel, of each of which one ray is kept: more would tell little, and a scan may
 /// send all it has in one direction.
 const PARTS: usize = 8;
-/// Distance of the places of a ball's disc at which is looked, for a near ray that is 1 away.
-const STEP: f32 = 0.3;
-/// Most places of a disc without a ray near to them: a tenth of a disc a little wider than what is near.
-const PLACES_MISSED_MAX: usize = 4;
 /// Where rays are looked for around a place, for a near ray that is 1 away.
 const AROUND: [[f32; 2]; 16] = [
     [-0.5, 0.0],
@@ -93,15 +90,16 @@ impl RayIndex {
     /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its
     /// disc lies farther than `near_m` from such a ray, but for a few beside each other, since rays are lost here and
     /// there. So what is wider than twice that, and in the ball, was met by one.
-    pub(super) fn pass(&self, ball: Ball, near_m: f32) -> bool {
+    pub(super) fn pass(&self, ball: Ball, near_m: f32, thresholds: &Thresholds) -> bool {
         let view = View { ball, distance_m: norm(ball.offset), across: across(ball.offset), near_m };
-        let step_m = STEP * near_m;
+        let step_m = thresholds.ray_place_step * near_m;
         let steps = (ball.radius_m / step_m).ceil() as i32;
         let along = || (-steps..=steps).map(|i| i as f32 * step_m);
         let disc = along().flat_map(|a| along().map(move |b| [a, b]));
         let places = disc.filter(|[a, b]| a * a + b * b <= ball.radius_m * ball.radius_m);
         // As soon as there is one too many nothing more is looked at.
-        places.filter(|&place| !self.runs_near(place, &view)).nth(PLACES_MISSED_MAX).is_none()
+        let missed_max = thresholds.ray_places_missed_max as usize;
+        places.filter(|&place| !self.runs_near(place, &view)).nth(missed_max).is_none()
     }
 
     /// How far from each other rays ran at most along the first axis of a window, wherever along the second, meters; no
@@ -206,13 +204,19 @@ mod tests {
         let index = RayIndex::of(map, &wall(0.1));
         let at = |x: f32, y: f32| Ball { offset: [x, y, 0.03], radius_m: 0.05 };
         // At 5 m they are 5 cm apart, and no place lies farther than 3.6 cm from one.
-        assert!(index.pass(at(5.0, 0.2), 0.036) && !index.pass(at(5.0, 0.2), 0.02));
-        assert!(!index.pass(at(5.0, 1.5), 0.036), "beside all rays");
-        assert!(!index.pass(at(9.98, 0.2), 0.1), "they end in it");
+        assert!(
+            index.pass(at(5.0, 0.2), 0.036, &Thresholds::DEFAULT)
+                && !index.pass(at(5.0, 0.2), 0.02, &Thresholds::DEFAULT)
+        );
+        assert!(!index.pass(at(5.0, 1.5), 0.036, &Thresholds::DEFAULT), "beside all rays");
+        assert!(!index.pass(at(9.98, 0.2), 0.1, &Thresholds::DEFAULT), "they end in it");
         let holed: Vec<_> =
             wall(0.1).into_iter().filter(|end| end[1].abs() > 0.2 || end[2].abs() > 0.2).collect();
         let index = RayIndex::of(map, &holed);
-        assert!(index.pass(at(5.0, 0.3), 0.04) && !index.pass(at(5.0, 0.0), 0.04));
+        assert!(
+            index.pass(at(5.0, 0.3), 0.04, &Thresholds::DEFAULT)
+                && !index.pass(at(5.0, 0.0), 0.04, &Thresholds::DEFAULT)
+        );
     }
 
     #[test]
@@ -221,9 +225,12 @@ mod tests {
         let rays: Vec<_> = wall(0.1).into_iter().chain(crowd).collect();
         let index = RayIndex::of(CubeMap::new(20), &rays);
         assert!(index.ends.len() <= wall(0.1).len() + 2 * PARTS);
-        assert!(index.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036));
+        assert!(index.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036, &Thresholds::DEFAULT));
         let fine = RayIndex::of(CubeMap::new(8), &wall(0.01));
         assert!(fine.ends.len() < wall(0.01).len() / 2);
-        assert!(fine.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036), "some are enough");
+        assert!(
+            fine.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036, &Thresholds::DEFAULT),
+            "some are enough"
+        );
     }
 }

@@ -1,9 +1,10 @@
 //! The image of a scan that is being aligned: the nearest point in each direction, made in one pass.
 
-use super::cube_map::{CubeMap, FACES, Projection};
 use super::density::PointDensity;
-use super::sight::{Sight, sight};
 use crate::geometry::Point;
+use crate::visibility::directions::{CubeMap, FACES, Projection};
+use crate::visibility::image::{Sight, sight};
+use crate::visibility::thresholds::Thresholds;
 
 /// Tiles along the side of a face, at most: pixels of 0.5 to 1 degree.
 const TILES: usize = 13;
@@ -12,8 +13,8 @@ const POINTS_OF_DENSITY: usize = 1 << 15;
 
 /// The depth of the nearest point of a scan in each pixel of a cube around its sensor.
 ///
-/// Unlike a [`RangeImage`](super::RangeImage) it is not kept, so that it need not be small: it tells what the points
-/// say and nothing of what lies between them.
+/// Unlike a [`RangeImage`](crate::visibility::RangeImage) it is not kept, so that it need not be small: it tells what
+/// the points say and nothing of what lies between them.
 #[derive(Debug, Clone)]
 pub struct ScanImage {
     map: CubeMap,
@@ -29,7 +30,7 @@ impl ScanImage {
     pub fn of(points: &[Point]) -> Self {
         let some = points.iter().step_by(points.len().div_ceil(POINTS_OF_DENSITY).max(1));
         let offsets: Vec<[f32; 3]> = some.map(|point| point.xyz()).collect();
-        let density = PointDensity::no_finer_than(TILES, &offsets);
+        let density = PointDensity::no_finer_than(TILES, &offsets, &Thresholds::DEFAULT);
         let map = density.map_or(CubeMap::new(TILES), |density| density.map);
         let mut image = Self { map, depths_m: vec![f32::INFINITY; FACES * map.pixels() * map.pixels()] };
         for point in points {

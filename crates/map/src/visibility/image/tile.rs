@@ -1,14 +1,14 @@
 //! Depths of 8 x 8 pixels: two integers for all of them, and six bits each.
 
-use super::cube_map::TILE_SIDE;
+use crate::visibility::directions::TILE_SIDE;
 
 /// Pixels of a tile.
-pub(super) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
+pub(in crate::visibility) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
 /// Bits of a pixel when it is stored. Eight would tell depths better, but of fewer pixels: coarser ones tell less of a
 /// scan all around than the rounding takes.
 const PIXEL_BITS: usize = 6;
 /// Bytes of a tile when it is stored.
-pub(super) const TILE_BYTES: usize = 4 + TILE_PIXELS * PIXEL_BITS / 8;
+pub(in crate::visibility) const TILE_BYTES: usize = 4 + TILE_PIXELS * PIXEL_BITS / 8;
 /// Steps that a pixel's bits tell apart: 0 says that it was not seen.
 const STEPS: u32 = (1 << PIXEL_BITS) - 2;
 /// Bits that a tile's step takes when it is stored; the others of its two bytes are the tile's gap.
@@ -28,7 +28,7 @@ const PACKED_BYTES: usize = PACKED_PIXELS * PIXEL_BITS / 8;
 /// Depths beside each other are alike, so that little is lost where they are rounded down: no more is said to be seen
 /// than was.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Tile {
+pub(in crate::visibility) struct Tile {
     base: u16,
     step: u16,
     /// How far apart rays passed at most through what was seen of it, in [`GAP_UNIT`].
@@ -38,7 +38,7 @@ pub(super) struct Tile {
 
 impl Tile {
     /// A tile of depths in the image's unit, without gaps; none of pixels that were not seen.
-    pub(super) fn new(depths: &[Option<u16>; TILE_PIXELS]) -> Self {
+    pub(in crate::visibility) fn new(depths: &[Option<u16>; TILE_PIXELS]) -> Self {
         let seen = || depths.iter().flatten().copied();
         let base = seen().min().unwrap_or(0);
         let step = u32::from(seen().max().unwrap_or(0) - base).div_ceil(STEPS).max(1) as u16;
@@ -47,33 +47,33 @@ impl Tile {
     }
 
     /// Tells of a gap between rays through what was seen of it, radians.
-    pub(super) fn note_gap(&mut self, gap: f32) {
+    pub(in crate::visibility) fn note_gap(&mut self, gap: f32) {
         self.gap = self.gap.max(((gap / GAP_UNIT).ceil() as u8).min(GAPS));
     }
 
     /// How deep a pixel was seen, in the image's unit; none where it was not.
     #[inline(always)]
-    pub(super) fn depth(&self, pixel: usize) -> Option<u32> {
+    pub(in crate::visibility) fn depth(&self, pixel: usize) -> Option<u32> {
         let seen = u32::from(self.seen[pixel]);
         (seen > 0).then(|| u32::from(self.base) + u32::from(self.step) * (seen - 1))
     }
 
     /// How far apart rays passed at most through what was seen of it, radians.
-    pub(super) fn gap(&self) -> f32 {
+    pub(in crate::visibility) fn gap(&self) -> f32 {
         f32::from(self.gap) * GAP_UNIT
     }
 
     /// By how much depths may have been rounded down, in the image's unit.
-    pub(super) fn step(&self) -> u16 {
+    pub(in crate::visibility) fn step(&self) -> u16 {
         self.step
     }
 
     /// How many pixels were seen.
-    pub(super) fn seen_pixels(&self) -> usize {
+    pub(in crate::visibility) fn seen_pixels(&self) -> usize {
         self.seen.iter().filter(|seen| **seen > 0).count()
     }
 
-    pub(super) fn write(&self, bytes: &mut Vec<u8>) {
+    pub(in crate::visibility) fn write(&self, bytes: &mut Vec<u8>) {
         bytes.extend_from_slice(&self.base.to_le_bytes());
         bytes.extend_from_slice(&(u16::from(self.gap) << STEP_BITS | self.step).to_le_bytes());
         for pixels in self.seen.as_chunks::<PACKED_PIXELS>().0 {
@@ -82,7 +82,7 @@ impl Tile {
         }
     }
 
-    pub(super) fn read(bytes: &[u8; TILE_BYTES]) -> Self {
+    pub(in crate::visibility) fn read(bytes: &[u8; TILE_BYTES]) -> Self {
         let [b0, b1, s0, s1, packed @ ..] = bytes;
         let packed = packed.as_chunks::<PACKED_BYTES>().0;
         let seen = std::array::from_fn(|pixel| {

@@ -1,30 +1,19 @@
 //! A range image: how far a scan saw in each direction.
 
-use super::cube_map::{CubeMap, Pixel, Projection};
-use super::density::PointDensity;
-use super::image_layout::tiles_max;
-use super::nearest_depths::{NearestDepths, SPACING_MAX};
-use super::ray_gaps::RayGaps;
 use super::sight::{Sight, sight};
-use super::sweep::Sweep;
 use super::tile::Tile;
-use super::vectors::norm;
-use crate::geometry::Point;
+use crate::visibility::directions::norm;
+use crate::visibility::directions::{CubeMap, Pixel, Projection};
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
-/// Tiles along the side of a face, finest first, fewer than an image's first byte has room for (`image_bytes`): pixels
-/// of 0.6 to 7 degrees.
-const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
 /// How much nearer than where nothing was met a pixel may tell it, as a share: its depth is the least of rays that ran
 /// up to 2.9 degrees away, and of a place in it.
 const OPEN_SLACK: f32 = 0.035;
 /// Depths in the image's unit are at most this.
-pub(super) const DEPTH_MAX: f32 = u16::MAX as f32;
+pub(in crate::visibility) const DEPTH_MAX: f32 = u16::MAX as f32;
 /// Pixels around one in which what is seen from a moving sensor is looked for, at most.
 const MOVED_PIXELS_MAX: f32 = 8.0;
-/// How much more coarser pixels have to tell, since they tell it less well.
-const WORTHWHILE: f32 = 1.03;
 
 /// How far a scan saw in each direction from its sensor: on the six faces of a cube around it, the depth along the
 /// face's axis up to which nothing was in the way (paper III-B: free space is generated from the recorded poses and the
@@ -35,21 +24,23 @@ const WORTHWHILE: f32 = 1.03;
 ///
 /// Rays that a moving sensor took elsewhere count as taken from the image's place, up to [`Sweep::moved_m`] beside
 /// where they ran. So a place counts as seen through only where all that lies so near to it was.
+///
+/// [`Sweep::moved_m`]: crate::visibility::Sweep::moved_m
 #[derive(Clone, PartialEq)]
 pub struct RangeImage {
-    pub(super) map: CubeMap,
+    pub(in crate::visibility) map: CubeMap,
     /// Meters of one unit of depth.
-    pub(super) unit_m: f32,
-    pub(super) rays: Rays,
-    /// [`Sweep::open_m`].
-    pub(super) open_m: f32,
+    pub(in crate::visibility) unit_m: f32,
+    pub(in crate::visibility) rays: RaySpacing,
+    /// [`Sweep::open_m`](crate::visibility::Sweep::open_m).
+    pub(in crate::visibility) open_m: f32,
     /// For each tile of the cube its number among those that are kept.
-    pub(super) places: Vec<u16>,
-    pub(super) tiles: Vec<Tile>,
+    pub(in crate::visibility) places: Vec<u16>,
+    pub(in crate::visibility) tiles: Vec<Tile>,
 }
 
 /// The place of a tile that is not kept.
-pub(super) const NOT_SEEN: u16 = u16::MAX;
+pub(in crate::visibility) const NOT_SEEN: u16 = u16::MAX;
 
 /// A place that a scan met.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,11 +53,11 @@ pub struct Met {
 
 /// How the rays of an image lay.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rays {
-    /// [`Sweep::moved_m`].
-    pub(super) moved_m: f32,
-    /// [`PointDensity::spacing`].
-    pub(super) spacing: f32,
+pub(in crate::visibility) struct RaySpacing {
+    /// [`Sweep::moved_m`](crate::visibility::Sweep::moved_m).
+    pub(in crate::visibility) moved_m: f32,
+    /// The spacing of its points, see `PointDensity`.
+    pub(in crate::visibility) spacing: f32,
 }
 
 /// The evidence that proves a place empty: see [`RangeImage::proves_absent`].
@@ -79,65 +70,6 @@ pub struct AbsenceEvidence {
 }
 
 impl RangeImage {
-    /// The image of at most `bytes_max` bytes of a scan whose rays ended at `points` (sensor frame, finite); none where
-    /// nothing is seen.
-    ///
-    /// Points of the robot itself belong to them: what lies behind it was not seen. Pixels are as fine as `bytes_max`
-    /// allows and as the points lie. Those in which the points lie far from each other are not seen.
-    pub fn of_points(points: &[Point], sweep: Sweep, bytes_max: usize) -> Option<Self> {
-        let offsets: Vec<_> = points.iter().filter_map(|point| sweep.limited(point.xyz())).collect();
-        let PointDensity { map, spacing } = PointDensity::of(&offsets)?;
-        let rays = Rays { moved_m: sweep.told_moved_m(), spacing };
-        let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
-        let mut fitting =
-            depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map(), bytes_max));
-        let of_depths = |depths: &NearestDepths| Self::of_depths(depths, rays, sweep.open_m);
-        let first = of_depths(&fitting.next()?);
-        // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
-        let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
-        let mut best = coarser.map(|depths| of_depths(&depths)).fold(first, Self::that_tells_more);
-        best.note_gaps(&RayGaps { map: map.finer(), spacing, offsets: &offsets });
-        (!best.tiles.is_empty()).then_some(best)
-    }
-
-    /// Tells the gaps between rays in the tiles that were seen there: pixels and their parts are too wide to tell of
-    /// them.
-    fn note_gaps(&mut self, gaps: &RayGaps<'_>) {
-        gaps.for_each(|direction, gap| {
-            let Some(Projection { face, pixel, .. }) = self.map.project(direction) else { return };
-            let (tile, pixel) = self.map.place(face, pixel);
-            let kept = self.tiles.get_mut(usize::from(self.places[tile]));
-            if let Some(tile) = kept.filter(|tile| tile.depth(pixel).is_some()) {
-                tile.note_gap(gap);
-            }
-        });
-    }
-
-    /// The coarser image where it tells so much more that this is worth it.
-    fn that_tells_more(finer: Self, coarser: Self) -> Self {
-        if coarser.seen_area() > WORTHWHILE * finer.seen_area() { coarser } else { finer }
-    }
-
-    /// The part of the cube around the sensor in which something was seen, in squares of side 1 at depth 1.
-    fn seen_area(&self) -> f32 {
-        let seen: usize = self.tiles.iter().map(Tile::seen_pixels).sum();
-        seen as f32 * self.map.pitch() * self.map.pitch()
-    }
-
-    fn of_depths(depths: &NearestDepths, rays: Rays, open_m: f32) -> Self {
-        let map = depths.map();
-        let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
-        let (mut places, mut tiles) = (vec![NOT_SEEN; map.tiles_of_all_faces()], Vec::new());
-        for (place, seen) in places.iter_mut().zip(depths.seen_tiles(rays.spacing)) {
-            let depths = seen.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
-            if depths.iter().any(Option::is_some) {
-                *place = tiles.len() as u16;
-                tiles.push(Tile::new(&depths));
-            }
-        }
-        Self { map, unit_m, rays, open_m, places, tiles }
-    }
-
     /// True where the scan proves the point at `offset` from the sensor, in its frame, to be free: the scan saw beyond
     /// it.
     #[inline]
@@ -199,7 +131,7 @@ impl RangeImage {
 
     /// How deep a pixel was seen, meters; none where it was not.
     #[inline(always)]
-    pub(super) fn depth_m(&self, face: usize, pixel: [usize; 2]) -> Option<f32> {
+    pub(in crate::visibility) fn depth_m(&self, face: usize, pixel: [usize; 2]) -> Option<f32> {
         let (tile, pixel) = self.map.place(face, pixel);
         let tile = self.tiles.get(usize::from(self.places[tile]))?;
         tile.depth(pixel).map(|depth| depth as f32 * self.unit_m)
@@ -242,7 +174,7 @@ impl RangeImage {
     }
 
     /// The pixels of the tiles that are kept, seen or not.
-    pub(super) fn kept_pixels(&self) -> impl Iterator<Item = Pixel> {
+    pub(in crate::visibility) fn kept_pixels(&self) -> impl Iterator<Item = Pixel> {
         let kept = self.places.iter().enumerate().filter(|(_, place)| **place != NOT_SEEN);
         kept.flat_map(|(tile, _)| self.map.pixels_of_tile(tile))
     }
@@ -272,7 +204,7 @@ impl RangeImage {
     }
 
     /// Its pixels.
-    pub(super) fn map(&self) -> CubeMap {
+    pub(in crate::visibility) fn map(&self) -> CubeMap {
         self.map
     }
 

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::coverage::Coverage;
-use super::cube_map::TILE_SIDE;
-use super::range_image::{Met, RangeImage};
 use crate::geometry::{Pose, rotation_xyzw, translation_m};
 use crate::util::Digest;
+use crate::visibility::directions::TILE_SIDE;
+use crate::visibility::image::{Met, RangeImage};
 
 /// Places that a viewpoint met, which scans are compared with.
 const MET: usize = 500;
@@ -34,8 +34,8 @@ impl PartialEq for MetOnce {
     }
 }
 
-/// Most bytes of memory of a viewpoint whose image has at most [`IMAGE_BYTES_MAX`](super::IMAGE_BYTES_MAX) bytes: the
-/// places of 104 x 104 tiles on each face, and 17 x 17 x 17 cells of an index, read and in a growing list.
+/// Most bytes of memory of a viewpoint whose image has at most [`IMAGE_BYTES_MAX`](crate::visibility::IMAGE_BYTES_MAX)
+/// bytes: the places of 104 x 104 tiles on each face, and 17 x 17 x 17 cells of an index, read and in a growing list.
 pub const VIEWPOINT_MEMORY_MAX: usize = 512 << 10;
 
 impl Viewpoint {

@@ -1,13 +1,7 @@
 //! Gaps between the rays of a scan: how wide they are where.
 
-use super::cube_map::{CubeMap, FACES, Projection};
-
-/// Holes of a few lost rays are up to so many spacings of the rays wide, and long.
-const LOST_WIDTH: f32 = 2.2;
-const LOST_LENGTH: f32 = 5.0;
-/// How much of their width counts: a ray lost from a square grid leaves a hole two spacings wide, and one in a hundred
-/// is.
-const LOST_SHARE: f32 = 0.6;
+use crate::visibility::directions::{CubeMap, FACES, Projection};
+use crate::visibility::thresholds::Thresholds;
 
 /// The gaps between the rays of a scan.
 pub(super) struct RayGaps<'a> {
@@ -17,6 +11,7 @@ pub(super) struct RayGaps<'a> {
     pub(super) spacing: f32,
     /// Where rays ended: offsets from the sensor.
     pub(super) offsets: &'a [[f32; 3]],
+    pub(super) thresholds: &'a Thresholds,
 }
 
 /// Where the rays in a pixel ran on its face: the smallest and the largest coordinate, to the right and up.
@@ -79,8 +74,10 @@ impl RayGaps<'_> {
         let to_side = narrowest(0, pixel[1], side) * self.map.angle_of_step(pixel, [1, 0]);
         let up = narrowest(1, pixel[0], 1) * self.map.angle_of_step(pixel, [0, 1]);
         let (width, length) = (to_side.min(up), to_side.max(up));
-        let is_of_lost_rays = width <= LOST_WIDTH * self.spacing && length <= LOST_LENGTH * self.spacing;
-        width.is_finite().then_some(if is_of_lost_rays { LOST_SHARE * width } else { width })
+        let Thresholds { lost_width_max, lost_length_max, lost_weight, .. } = self.thresholds;
+        let is_of_lost_rays =
+            width <= lost_width_max * self.spacing && length <= lost_length_max * self.spacing;
+        width.is_finite().then_some(if is_of_lost_rays { lost_weight * width } else { width })
     }
 }
 
@@ -123,7 +120,12 @@ mod tests {
 
     fn widest_deg(rays: &[[f32; 3]], within_deg: f32) -> f32 {
         let within = within_deg.to_radians().tan();
-        let gaps = RayGaps { map: CubeMap::new(32), spacing: 0.5f32.to_radians(), offsets: rays };
+        let gaps = RayGaps {
+            map: CubeMap::new(32),
+            spacing: 0.5f32.to_radians(),
+            offsets: rays,
+            thresholds: &Thresholds::DEFAULT,
+        };
         let mut widest = 0f32;
         gaps.for_each(|[x, y, z], gap| {
             if x > 0.0 && y.abs() < within && z.abs() < within {

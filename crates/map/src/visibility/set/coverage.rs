@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use hashbrown::HashMap;
 
-use super::range_image::RangeImage;
 use crate::geometry::Pose;
+use crate::visibility::image::RangeImage;
 
 /// How many cells a viewpoint reaches in each direction, at most.
 const CELLS_OF_REACH: f64 = 8.0;
