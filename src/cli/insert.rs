@@ -24,7 +24,7 @@ use mrol_map::align::Method;
 use mrol_map::geometry::Pose;
 use mrol_map::map::{MapOrigin, RobotName, SessionName};
 use mrol_map::mapping::Guess;
-use mrol_map::scan::{PointFilter, SkippedPoints, read_exact_points, scan_files};
+use mrol_map::scan::{Columns, PointFilter, SkippedPoints, read_exact_points_by, scan_files};
 use mrol_service::{ScanAnswer, ScanRequest};
 
 /// Scans read ahead of the one that is being sent.
@@ -48,7 +48,7 @@ other scans are sent all the same, and the exit code is then 3. It is 1 where sc
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Insert {
-    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin .f32
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
@@ -88,6 +88,9 @@ pub(super) struct Insert {
     /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none
     #[arg(long, value_name = "NAME", requires = "first_scan_id", value_parser = parse::session_name)]
     session: Option<SessionName>,
+    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<Columns>,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or,
     /// with --create, the first point. It is subtracted from them in double precision
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
@@ -154,8 +157,10 @@ impl Insert {
         let name = &self.map.name;
         // Who may only insert is not told, and neither is anybody of a map that is not there.
         let there = client.map_info(name).await.ok().map(|info| info.settings);
-        let first =
-            files.first().map(|file| read_exact_points(file).map(|points| (file, points))).transpose()?;
+        let first = files
+            .first()
+            .map(|file| read_exact_points_by(file, self.columns).map(|points| (file, points)))
+            .transpose()?;
         let origin = match (self.origin, &first, there.and_then(|settings| settings.origin)) {
             (None, ..) | (_, None, _) => None,
             (Some(OriginChoice::Auto), _, Some(of_map)) => Some(of_map),
@@ -182,7 +187,7 @@ impl Insert {
         let has_poses = self.truth.is_some() || self.guess.is_some();
         let points = first.map(|(_, points)| points).unwrap_or_default();
         let resolution_m = settings.map_or(RESOLUTION_UNKNOWN_M, |settings| settings.resolution_m);
-        Ok(Survey::of(&points, origin, has_poses, resolution_m))
+        Ok(Survey::of(&points, origin, has_poses, resolution_m).with_columns(self.columns))
     }
 
     fn first_guess(&self, survey: &Survey) -> (Guess, bool) {

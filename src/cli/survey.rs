@@ -9,7 +9,7 @@ use mrol::console::{CliError, OriginChoice, Survey, parse};
 use mrol_client::Client;
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapName, MapOrigin, MapSettings};
-use mrol_map::scan::read_exact_points;
+use mrol_map::scan::{Columns, read_exact_points_by};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct SurveyOptions {
@@ -17,6 +17,9 @@ pub(super) struct SurveyOptions {
     /// subtracted from them, and answers are in the map's coordinates [default: they are the map's]
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
     origin: Option<OriginChoice>,
+    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<Columns>,
 }
 
 impl SurveyOptions {
@@ -48,7 +51,15 @@ impl SurveyOptions {
                 Some(given)
             }
         };
-        Ok(Survey::of(first, origin, has_poses, settings.resolution_m))
+        Ok(Survey::of(first, origin, has_poses, settings.resolution_m).with_columns(self.columns))
+    }
+
+    /// The points of a file, in f64.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub(super) fn read(&self, file: &Path) -> Result<Vec<Point3<f64>>, CliError> {
+        Ok(read_exact_points_by(file, self.columns)?)
     }
 
     /// The points of a file or, without one, those given, in f64, with how they lie to the map.
@@ -64,7 +75,7 @@ impl SurveyOptions {
         has_poses: bool,
     ) -> Result<(Vec<Point3<f64>>, Survey), CliError> {
         let points = match file {
-            Some(file) => read_exact_points(file)?,
+            Some(file) => self.read(file)?,
             None => given.iter().map(|&place| Point3::from(place)).collect(),
         };
         if let Some(file) = file.filter(|_| points.is_empty()) {

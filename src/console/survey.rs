@@ -7,7 +7,7 @@ use nalgebra::{Point3, Translation3, Vector3};
 use super::error::CliError;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapOrigin;
-use mrol_map::scan::{PointFilter, read_exact_points};
+use mrol_map::scan::{Columns, PointFilter, read_exact_points_by};
 
 /// Coordinates are too coarse where rounding them to f32 moves a point by more than this share of a voxel.
 const ROUNDING_SHARE: f64 = 1.0 / 16.0;
@@ -56,6 +56,8 @@ pub struct Survey {
     /// What is subtracted from the points of every file, and put into their poses.
     shift: Vector3<f64>,
     resolution_m: f64,
+    /// What the columns of files hold, where somebody said so.
+    columns: Option<Columns>,
 }
 
 impl Survey {
@@ -68,7 +70,18 @@ impl Survey {
             true => near.filter(|_| is_coarse(first, &Vector3::zeros(), resolution_m)),
             false => origin,
         };
-        Self { origin: origin.unwrap_or_default(), shift: shift.unwrap_or_default(), resolution_m }
+        Self {
+            origin: origin.unwrap_or_default(),
+            shift: shift.unwrap_or_default(),
+            resolution_m,
+            columns: None,
+        }
+    }
+
+    /// The survey of files with these columns.
+    #[must_use]
+    pub fn with_columns(self, columns: Option<Columns>) -> Self {
+        Self { columns, ..self }
     }
 
     /// The points of a scan file near 0.
@@ -76,7 +89,7 @@ impl Survey {
     /// # Errors
     /// The file cannot be read, or its points are still too far from 0 for f32.
     pub fn read(&self, file: &Path) -> Result<Vec<Point>, CliError> {
-        let points = read_exact_points(file)?;
+        let points = read_exact_points_by(file, self.columns)?;
         self.check(&file.display().to_string(), &points)?;
         let zero = Point3::origin();
         // 0 0 0 says that nothing returned, wherever the survey is.
@@ -141,6 +154,7 @@ fn half_step(number: f32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mrol_map::scan::read_exact_points;
     use nalgebra::UnitQuaternion;
 
     fn written(points: &[[f64; 3]]) -> (tempfile::TempDir, std::path::PathBuf) {

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod alignment;
+mod bare_floats;
 mod filter_identity;
 mod localization;
 mod maps;

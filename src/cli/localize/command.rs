@@ -19,7 +19,7 @@ use mrol_map::align::localize::{
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::mapping::MappingError;
-use mrol_map::scan::{PointFilter, SkippedPoints, read_exact_points, scan_files};
+use mrol_map::scan::{PointFilter, SkippedPoints, scan_files};
 use mrol_map::util::StopSignal;
 use mrol_service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
 use mrol_store::{Disk, Snapshot};
@@ -41,7 +41,7 @@ may be 2 degrees off.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Localize {
-    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin .f32
     #[arg(required = true, value_name = "SCAN")]
     scans: Vec<PathBuf>,
     /// A map file, as `mrol map --out` writes it
@@ -92,7 +92,7 @@ impl Localize {
         };
         let survey = match files.first() {
             Some(file) => {
-                Some(self.survey.survey(&place.settings().await?, &read_exact_points(file)?, false)?)
+                Some(self.survey.survey(&place.settings().await?, &self.survey.read(file)?, false)?)
             }
             None => None,
         };

@@ -21,7 +21,7 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
 use mrol_map::scan::{
-    PointFilter, SkippedPoints, StampedPose, read_exact_points, scan_files, write_trajectory,
+    Columns, PointFilter, SkippedPoints, StampedPose, read_exact_points_by, scan_files, write_trajectory,
 };
 use mrol_store::{Disk, Snapshot};
 
@@ -48,7 +48,7 @@ printed when --truth or --lookup is given.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
-    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin .f32
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters
@@ -92,6 +92,9 @@ pub(crate) struct Map {
     /// returned]
     #[arg(long)]
     keep_zeros: bool,
+    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<Columns>,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It
     /// is subtracted from them in double precision, and kept in the map
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
@@ -154,10 +157,11 @@ impl Map {
         let Some(file) = files.first() else {
             return Ok((Survey::of(&[], None, false, self.resolution), None));
         };
-        let first = read_exact_points(file)?;
+        let first = read_exact_points_by(file, self.columns)?;
         let origin = self.origin.map(|choice| choice.origin(file, &first)).transpose()?;
         let has_poses = self.first_pose.is_some() || self.at_truth;
-        Ok((Survey::of(&first, origin, has_poses, self.resolution), origin))
+        let survey = Survey::of(&first, origin, has_poses, self.resolution);
+        Ok((survey.with_columns(self.columns), origin))
     }
 
     fn map_settings(&self) -> MapSettings {

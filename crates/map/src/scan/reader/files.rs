@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
 
+use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::ReadError;
 use super::format::Format;
@@ -17,14 +18,16 @@ use crate::geometry::Point;
 ///
 /// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
 /// binary, binary_compressed), `.xyz` (text: the first three columns, or those that a line of names says, divided by
-/// spaces, commas or semicolons; `#`, `//` or `%` starts a comment), `.f32` (raw little-endian x y z). Points that
-/// are not finite are kept: they mean "no return". Coordinates are rounded to f32, see [`read_exact_points`].
+/// spaces, commas or semicolons; `#`, `//` or `%` starts a comment), `.npy` (an array of shape (..., 3), or with columns
+/// behind x y z), `.bin` (little-endian float32 x y z i), `.f32` (x y z). Points that are not finite are kept: they mean
+/// "no return". Coordinates are rounded to f32, see [`read_exact_points`].
 ///
 /// # Errors
 /// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
-/// the error names the file and the line, byte or element.
+/// the error names the file and the line, byte or element. Bare floats that look like rows of another length are refused
+/// too, naming the [`Columns`] that they seem to have.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
-    read(path)
+    read(path, None)
 }
 
 /// The points of [`read_points`] in double precision, as files in survey coordinates have them.
@@ -32,13 +35,21 @@ pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
 /// # Errors
 /// Those of [`read_points`].
 pub fn read_exact_points(path: &Path) -> Result<Vec<Point3<f64>>, ReadError> {
-    read(path)
+    read(path, None)
 }
 
-fn read<C: Coordinates>(path: &Path) -> Result<Vec<C>, ReadError> {
+/// [`read_exact_points`] of a text, an array or bare floats whose columns somebody named.
+///
+/// # Errors
+/// Those of [`read_points`], and columns for a file whose header names its own.
+pub fn read_exact_points_by(path: &Path, columns: Option<Columns>) -> Result<Vec<Point3<f64>>, ReadError> {
+    read(path, columns)
+}
+
+fn read<C: Coordinates>(path: &Path, columns: Option<Columns>) -> Result<Vec<C>, ReadError> {
     let format = Format::named_by(path)?;
     let bytes = read_file(path)?;
-    format.points(&bytes).map_err(|problem| problem.in_file(path))
+    format.points(&bytes, columns).map_err(|problem| problem.in_file(path))
 }
 
 /// The points in the `bytes` of a scan file; `path` gives the format by its extension, and errors name it.
@@ -46,7 +57,7 @@ fn read<C: Coordinates>(path: &Path) -> Result<Vec<C>, ReadError> {
 /// # Errors
 /// When the bytes are of another format, broken or truncated.
 pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> {
-    Format::named_by(path)?.points(bytes).map_err(|problem| problem.in_file(path))
+    Format::named_by(path)?.points(bytes, None).map_err(|problem| problem.in_file(path))
 }
 
 /// The scan files that `paths` name: a directory gives its scan files in the natural order of

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::{Problem, ReadError};
-use super::{pcd, ply, text};
-use crate::geometry::Point;
+use super::{bare, npy, pcd, ply, text};
 
 /// The extension of `path` without its dot, in lower case.
 fn extension(path: &Path) -> String {
@@ -17,6 +17,9 @@ pub(super) enum Format {
     Ply,
     Pcd,
     Xyz,
+    Npy,
+    /// x y z and an intensity.
+    Bin,
     F32,
 }
 
@@ -31,28 +34,29 @@ impl Format {
             "ply" => Some(Self::Ply),
             "pcd" => Some(Self::Pcd),
             "xyz" => Some(Self::Xyz),
+            "npy" => Some(Self::Npy),
+            "bin" => Some(Self::Bin),
             "f32" => Some(Self::F32),
             _ => None,
         }
     }
 
-    pub(super) fn points<C: Coordinates>(self, bytes: &[u8]) -> Result<Vec<C>, Problem> {
+    /// The points of a file with these bytes, whose columns somebody named, or nobody.
+    pub(super) fn points<C: Coordinates>(
+        self,
+        bytes: &[u8],
+        columns: Option<Columns>,
+    ) -> Result<Vec<C>, Problem> {
         match self {
+            Self::Ply | Self::Pcd if columns.is_some() => {
+                Err(Problem::new("the file's own header names its columns: leave --columns out"))
+            }
             Self::Ply => ply::points(bytes),
             Self::Pcd => pcd::points(bytes),
-            Self::Xyz => text::points(bytes),
-            Self::F32 => packed_points(bytes),
+            Self::Xyz => text::points(bytes, columns),
+            Self::Npy => npy::points(bytes, columns),
+            Self::Bin => bare::points(bytes, columns, Columns::xyz_and(1)),
+            Self::F32 => bare::points(bytes, columns, Columns::xyz_and(0)),
         }
     }
-}
-
-fn packed_points<C: Coordinates>(bytes: &[u8]) -> Result<Vec<C>, Problem> {
-    let points: &[Point] = bytemuck::try_cast_slice(bytes).map_err(|_| {
-        let (size, whole) = (Point::BYTES, bytes.len() / Point::BYTES);
-        Problem::new(format!(
-            "{} bytes are not whole points of {size} bytes, point {whole} is cut short",
-            bytes.len()
-        ))
-    })?;
-    Ok(points.iter().map(|point| C::of_singles(point.xyz())).collect())
 }

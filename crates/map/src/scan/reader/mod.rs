@@ -4,6 +4,8 @@
 //! that are there, before anything is allocated for it.
 
 mod axis;
+mod bare;
+mod columns;
 mod coordinates;
 mod count;
 mod error;
@@ -11,16 +13,19 @@ mod files;
 mod format;
 mod lines;
 mod natural;
+mod npy;
 mod pcd;
 mod ply;
+mod row_length;
 mod supported;
 #[cfg(test)]
 mod tests;
 mod text;
 
+pub use columns::{Columns, ColumnsError};
 pub(super) use error::Problem;
 pub use error::ReadError;
 pub(super) use files::read_file;
-pub use files::{parse_points, read_exact_points, read_points, scan_files};
+pub use files::{parse_points, read_exact_points, read_exact_points_by, read_points, scan_files};
 pub(super) use lines::content_lines;
 pub(super) use text::number;

@@ -1,6 +1,7 @@
 //! Points in lines of text.
 
 use super::axis::axes;
+use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::{Problem, quoted};
 use super::lines::{Lines, check_text, comment, text_of};
@@ -8,11 +9,13 @@ use super::lines::{Lines, check_text, comment, text_of};
 /// Columns of x, y and z where no line of names says others.
 const FIRST_COLUMNS: [usize; 3] = [0, 1, 2];
 
-/// The points of an `.xyz` file: x y z are the first three columns, or those that a line of names before them says.
-pub(super) fn points<C: Coordinates>(bytes: &[u8]) -> Result<Vec<C>, Problem> {
+/// The points of an `.xyz` file: x y z are the columns that somebody named, those that a line of names before them says,
+/// or the first three.
+pub(super) fn points<C: Coordinates>(bytes: &[u8], named: Option<Columns>) -> Result<Vec<C>, Problem> {
     check_text(bytes)?;
     let mut lines = Lines::of(bytes);
     let Head { columns, declared } = Head::take(&mut lines);
+    let columns = named.map_or(columns, |named| named.axes);
     let mut points = Vec::new();
     for (number, line) in lines.filter(|(_, line)| is_content(line)) {
         let point = point(&text_of(line), columns).map_err(|problem| Problem::at_line(number, problem))?;

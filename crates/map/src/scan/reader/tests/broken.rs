@@ -15,8 +15,8 @@ fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {
     for (extension, bytes) in every_format() {
         let format = Format::of(Path::new(&format!("a.{extension}"))).unwrap();
         for end in 0..bytes.len() {
-            if let Ok(points) = format.points::<Point>(&bytes[..end]) {
-                let declared = matches!(format, Format::Ply | Format::Pcd);
+            if let Ok(points) = format.points::<Point>(&bytes[..end], None) {
+                let declared = matches!(format, Format::Ply | Format::Pcd | Format::Npy);
                 let last_line = end + 8 > bytes.len();
                 assert!(!declared || last_line, "{end} of {} bytes of {extension}", bytes.len());
                 assert!(points.len() <= sample().len());
@@ -37,7 +37,7 @@ fn garbage_in_any_place_never_panics() {
             for _ in 0..rng.random_range(1..6) {
                 broken[rng.random_range(0..end)] = garbage(&mut rng);
             }
-            let _ = format.points::<Point>(&broken);
+            let _ = format.points::<Point>(&broken, None);
         }
     }
 }
@@ -54,7 +54,7 @@ fn bytes_of_no_format_never_panic() {
         let format = Format::of(Path::new(&format!("a{extension}"))).unwrap();
         for length in 0..500 {
             let bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
-            let _ = format.points::<Point>(&bytes);
+            let _ = format.points::<Point>(&bytes, None);
         }
     }
 }

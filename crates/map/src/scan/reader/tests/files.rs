@@ -127,6 +127,22 @@ pub(super) fn xyz() -> Vec<u8> {
     format!("# x y z\n\n{}", text_lines(&sample(), "  ", " 0.5")).into_bytes()
 }
 
+/// A file of numpy.
+pub(super) fn npy(descr: &str, is_by_columns: bool, shape: &str, data: &[u8]) -> Vec<u8> {
+    let order = if is_by_columns { "True" } else { "False" };
+    let descr = if descr.starts_with('[') { descr.to_owned() } else { format!("'{descr}'") };
+    let header = format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}\n");
+    let length = (header.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), data].concat()
+}
+
+/// Bare floats x y z and an intensity.
+fn with_intensities() -> Vec<u8> {
+    let rows =
+        sample().into_iter().flat_map(|point| point.xyz().into_iter().chain([0.5]).collect::<Vec<f32>>());
+    rows.flat_map(f32::to_le_bytes).collect()
+}
+
 pub(super) fn every_format() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("ply", mixed_ascii_ply()),
@@ -137,6 +153,8 @@ pub(super) fn every_format() -> Vec<(&'static str, Vec<u8>)> {
         ("pcd", binary_pcd()),
         ("pcd", compressed_pcd()),
         ("xyz", xyz()),
+        ("npy", npy("<f4", false, "(50, 3)", bytemuck::cast_slice(&sample()))),
+        ("bin", with_intensities()),
         ("f32", bytemuck::cast_slice(&sample()).to_vec()),
     ]
 }

@@ -1,5 +1,6 @@
 //! Every format: the same points, in files built byte by byte.
 
+mod bare;
 mod broken;
 mod files;
 mod formats;
