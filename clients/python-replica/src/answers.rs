@@ -1,14 +1,17 @@
 //! Arrays of answers.
 
-use mrol_client::map::KeepOutName;
-use mrol_client::planning::{Clearance, Hit};
+use mrol_client::map::{ContentHash, KeepOutName};
+use mrol_client::planning::{Clearance, Frontier, Hit};
 use mrol_client::service::{Collisions, MapVersion};
 use mrol_client::voxel::VoxelKey;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-/// Which state of a map an answer is of: revision, uuid, and the hash in hexadecimal digits.
-pub(crate) type Version = (u64, String, Option<String>);
+use crate::region::PoseFields;
+
+/// Which state of a map an answer is of: revision, uuid, and the hash of its voxels.
+pub(crate) type Version = (u64, String, Option<u64>);
 
 /// The bits of an answer, as booleans.
 pub(crate) type Bools<'py> = Bound<'py, PyArray1<bool>>;
@@ -17,9 +20,20 @@ pub(crate) type Indices<'py> = Bound<'py, PyArray2<i32>>;
 
 /// A version, as the package takes it.
 pub(crate) fn told(version: &MapVersion) -> Version {
-    let hash = version.content_hash.map(|hash| hash.to_string());
+    let hash = version.content_hash.map(ContentHash::to_bits);
     (version.revision, version.map_uuid.to_string(), hash)
 }
+
+/// An answer: a dictionary of its fields by the names that they have over HTTP, and the version.
+macro_rules! answer {
+    ($py:expr, $version:expr, $($name:ident = $value:expr),* $(,)?) => {{
+        let fields = pyo3::types::PyDict::new($py);
+        fields.set_item(pyo3::intern!($py, "version"), crate::answers::told($version))?;
+        $(fields.set_item(pyo3::intern!($py, stringify!($name)), $value)?;)*
+        pyo3::PyResult::Ok(fields)
+    }};
+}
+pub(crate) use answer;
 
 /// The bits of each byte, lowest first.
 const BITS: [[bool; 8]; 256] = {
@@ -70,47 +84,80 @@ pub(crate) fn names(keep_outs: &[Option<KeepOutName>]) -> Option<Vec<Option<Stri
     keep_outs.iter().any(Option::is_some).then(|| keep_outs.iter().map(name).collect())
 }
 
-/// What is met first: links, parts, voxels, keep-outs.
-type FirstHits<'py> =
-    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Indices<'py>, Option<Vec<Option<String>>>);
-
-/// How much room there is: distances and the nearest links.
-type Clearances<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i64>>);
-
-/// An answer to a check of poses or spheres.
-pub(crate) type Checked<'py> = (Bools<'py>, usize, Option<FirstHits<'py>>, Option<Clearances<'py>>, Version);
-
 /// The answer to a check of poses or spheres.
 pub(crate) fn checked<'py>(
     py: Python<'py>,
     collisions: &Collisions,
     version: &MapVersion,
-) -> PyResult<Checked<'py>> {
+) -> PyResult<Bound<'py, PyDict>> {
     let words = collisions.words();
-    let (mut first_hits, mut clearances) = (None, None);
+    let fields = answer!(
+        py,
+        version,
+        checked = collisions.checked(),
+        colliding = of_words(py, &words, collisions.checked()),
+        colliding_count = ones(&words),
+    )?;
     match collisions {
         Collisions::Colliding { .. } => {}
-        Collisions::FirstHits(hits) => first_hits = Some(of_hits(py, hits)?),
-        Collisions::Clearances(of) => clearances = Some(of_clearances(py, of)),
+        Collisions::FirstHits(hits) => add_hits(&fields, hits)?,
+        Collisions::Clearances(of) => add_clearances(&fields, of)?,
     }
-    let colliding = of_words(py, &words, collisions.checked());
-    Ok((colliding, ones(&words), first_hits, clearances, told(version)))
+    Ok(fields)
 }
 
-fn of_hits<'py>(py: Python<'py>, hits: &[Option<Hit>]) -> PyResult<FirstHits<'py>> {
+fn add_hits(fields: &Bound<'_, PyDict>, hits: &[Option<Hit>]) -> PyResult<()> {
+    let py = fields.py();
     let number = |of: fn(&Hit) -> u32| {
         let numbers = hits.iter().map(|hit| hit.as_ref().map_or(-1, |hit| i64::from(of(hit))));
         PyArray1::from_vec(py, numbers.collect())
     };
     let voxel = |hit: &Option<Hit>| hit.as_ref().and_then(|hit| hit.met.voxel()).unwrap_or_default();
-    let voxels = indices(py, hits.iter().map(voxel))?;
     let keep_outs: Vec<Option<KeepOutName>> =
         hits.iter().map(|hit| hit.as_ref().and_then(|hit| hit.met.keep_out()).cloned()).collect();
-    Ok((number(|hit| hit.link), number(|hit| hit.part), voxels, names(&keep_outs)))
+    fields.set_item("hit_links", number(|hit| hit.link))?;
+    fields.set_item("hit_parts", number(|hit| hit.part))?;
+    fields.set_item("hit_voxels", indices(py, hits.iter().map(voxel))?)?;
+    fields.set_item("hit_keep_outs", names(&keep_outs))
 }
 
-fn of_clearances<'py>(py: Python<'py>, clearances: &[Clearance]) -> Clearances<'py> {
+fn add_clearances(fields: &Bound<'_, PyDict>, clearances: &[Clearance]) -> PyResult<()> {
+    let py = fields.py();
     let distances_m = clearances.iter().map(|clearance| clearance.distance_m).collect();
     let links = clearances.iter().map(|clearance| clearance.link.map_or(-1, i64::from)).collect();
-    (PyArray1::from_vec(py, distances_m), PyArray1::from_vec(py, links))
+    fields.set_item("clearances_m", PyArray1::from_vec(py, distances_m))?;
+    fields.set_item("nearest_links", PyArray1::<i64>::from_vec(py, links))
+}
+
+/// A frontier, by the names of its fields.
+#[derive(IntoPyObject)]
+pub(crate) struct FrontierFields {
+    voxels: u64,
+    center_m: [f64; 3],
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+    view: Option<ViewFields>,
+}
+
+/// Where a frontier can be seen from.
+#[derive(IntoPyObject)]
+struct ViewFields {
+    map_from_view: PoseFields,
+    target_m: [f64; 3],
+    yaw_rad: f64,
+    elevation_rad: f64,
+}
+
+impl FrontierFields {
+    /// The fields of a frontier.
+    pub(crate) fn of(frontier: &Frontier) -> Self {
+        let Frontier { voxels, center_m, min_m, max_m, view } = *frontier;
+        let view = view.map(|view| ViewFields {
+            map_from_view: PoseFields::of(&view.map_from_view),
+            target_m: view.target_m,
+            yaw_rad: view.yaw_rad,
+            elevation_rad: view.elevation_rad,
+        });
+        Self { voxels, center_m, min_m, max_m, view }
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mrol_client::geometry::Point;
 use mrol_client::planning::{Body, Link, NUMBERS_PER_POSE, Sphere};
 use pyo3::prelude::*;
 
@@ -9,7 +10,7 @@ use crate::arrays::Rows;
 use crate::failure::{Failure, guarded};
 
 /// A body that was made of its links: a question about it copies nothing of it.
-#[pyclass(frozen, subclass, module = "mrol_replica._native")]
+#[pyclass(frozen, subclass, module = "mrol_native")]
 pub(crate) struct NativeBody {
     pub(crate) body: Arc<Body>,
 }
@@ -21,7 +22,12 @@ impl NativeBody {
     }
 }
 
-/// Spheres of arrays of x y z r.
+/// Points of an array of x y z.
+fn points_of(numbers: &Rows<'_>) -> Vec<Point> {
+    numbers.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]].into()).collect()
+}
+
+/// Spheres of an array of x y z r.
 pub(crate) fn spheres_of(numbers: &Rows<'_>) -> Vec<Sphere> {
     let numbers = numbers.as_array();
     let of_row = |row: numpy::ndarray::ArrayView1<'_, f32>| Sphere {
@@ -31,25 +37,28 @@ pub(crate) fn spheres_of(numbers: &Rows<'_>) -> Vec<Sphere> {
     numbers.rows().into_iter().map(of_row).collect()
 }
 
+/// A link: spheres x y z r of shape (n, 4), points of shape (m, 3), and what is added to their radii.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct LinkFields<'py> {
+    spheres: Option<Rows<'py>>,
+    points: Option<Rows<'py>>,
+    padding_m: f32,
+}
+
 #[pymethods]
 impl NativeBody {
-    /// A body of links: spheres x y z r of shape (n, 4), points of shape (m, 3), and a padding each.
+    /// A body of links.
     #[new]
-    fn new(links: Vec<(Rows<'_>, Rows<'_>, f32)>) -> PyResult<Self> {
+    fn new(links: Vec<LinkFields<'_>>) -> PyResult<Self> {
         guarded(|| {
-            let links = links.into_iter().map(|(spheres, points, padding_m)| {
-                let points = points.as_array();
-                let points = points.rows().into_iter().map(|row| [row[0], row[1], row[2]].into()).collect();
-                Link { spheres: spheres_of(&spheres), points, padding_m }
+            let links = links.into_iter().map(|LinkFields { spheres, points, padding_m }| Link {
+                spheres: spheres.as_ref().map(spheres_of).unwrap_or_default(),
+                points: points.as_ref().map(points_of).unwrap_or_default(),
+                padding_m,
             });
             let body = Body::new(links.collect()).map_err(|error| Failure::argument(error.to_string()))?;
             Ok(Self { body: Arc::new(body) })
         })
-    }
-
-    /// How many links it has.
-    #[getter]
-    fn links(&self) -> usize {
-        self.body.links().len()
     }
 }

@@ -1,12 +1,38 @@
-//! Failures, as exceptions of the package `mrol`.
+//! Failures, as exceptions of the package `mrol`, which makes them.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use mrol_client::service::ServiceError;
 use mrol_client::{ClientError, ReplicaError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 
-/// Why a call fails. `kind` is a word of `mrol_replica/_failures.py`, which makes the exception.
+/// The functions of the package that make exceptions.
+struct Exceptions {
+    /// Of a failure: its kind, its code, its reason and its message.
+    failure: Py<PyAny>,
+    /// Of an argument that is none: its name, what was given, and what belongs there.
+    argument: Py<PyAny>,
+}
+
+static EXCEPTIONS: PyOnceLock<Exceptions> = PyOnceLock::new();
+
+/// Takes the functions that make exceptions; those that were given first stay.
+#[pyfunction]
+pub(crate) fn set_exceptions(py: Python<'_>, failure: Py<PyAny>, argument: Py<PyAny>) {
+    let _ = EXCEPTIONS.set(py, Exceptions { failure, argument });
+}
+
+/// The exception that a function of the package makes.
+fn made<'py>(py: Python<'py>, make: impl FnOnce(&'py Exceptions) -> PyResult<Py<PyAny>>) -> PyErr {
+    let Some(exceptions) = EXCEPTIONS.get(py) else {
+        return PyRuntimeError::new_err("mrol_native is a part of mrol: import mrol.replica");
+    };
+    make(exceptions).map_or_else(|error| error, |exception| PyErr::from_value(exception.into_bound(py)))
+}
+
+/// Why a call fails. `kind` is a word of `failures.py` of the package.
 #[derive(Debug)]
 pub(crate) struct Failure {
     kind: &'static str,
@@ -59,18 +85,13 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         // What it carries may panic in turn when it is dropped.
         std::mem::forget(panic);
-        Err(Failure::defect("a defect of mrol_replica: it panicked").into())
+        Err(Failure::defect("a defect of mrol-replica: it panicked").into())
     })
 }
 
 /// An argument is none: `mrol.ArgumentError`, with its name, what was given, and what belongs there.
 pub(crate) fn argument(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
-    let made = value
-        .py()
-        .import("mrol_replica._failures")
-        .and_then(|module| module.getattr("argument"))
-        .and_then(|exception| exception.call1((name, value, expected)));
-    made.map_or_else(|error| error, PyErr::from_value)
+    made(value.py(), |exceptions| exceptions.argument.call1(value.py(), (name, value, expected)))
 }
 
 impl From<ServiceError> for Failure {
@@ -126,11 +147,7 @@ impl From<Failure> for PyErr {
     fn from(failure: Failure) -> Self {
         let Failure { kind, code, reason, message } = failure;
         Python::attach(|py| {
-            let made = py
-                .import("mrol_replica._failures")
-                .and_then(|module| module.getattr("exception"))
-                .and_then(|exception| exception.call1((kind, code, reason, message)));
-            made.map_or_else(|error| error, PyErr::from_value)
+            made(py, |exceptions| exceptions.failure.call1(py, (kind, code, reason, message)))
         })
     }
 }

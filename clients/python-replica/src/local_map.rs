@@ -20,9 +20,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::answers::{Indices, Version, indices, of_bytes, told};
-use crate::arrays::{Rows, Times};
+use crate::arrays::{Rows, Times, points_of};
 use crate::failure::{Failure, guarded};
-use crate::questions::{Questions, Seven, points_of, pose_of, region_of};
+use crate::questions::NativeMap;
+use crate::region::{Seven, Shape, pose_of};
 use crate::source::{OpenSource, Source};
 use crate::waiting::{threads, wait_for};
 
@@ -30,10 +31,10 @@ use crate::waiting::{threads, wait_for};
 const NAME: &str = "local";
 
 /// A map without a server.
-#[pyclass(frozen, extends = Questions, module = "mrol_replica._native")]
+#[pyclass(frozen, extends = NativeMap, module = "mrol_native")]
 pub(crate) struct NativeLocalMap;
 
-/// What a scan is sent with, where it is given: the fields of `mrol_replica.LocalMap.insert`.
+/// What a scan is sent with, where it is given: the fields of `LocalMap.insert` of the package.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct ScanFields<'py> {
@@ -166,7 +167,7 @@ fn service() -> Result<MapService, Failure> {
 
 fn made(service: MapService) -> PyResult<PyClassInitializer<NativeLocalMap>> {
     let source = OpenSource::new(Source::Local { service, name: name()? });
-    Ok(PyClassInitializer::from(Questions { source }).add_subclass(NativeLocalMap))
+    Ok(PyClassInitializer::from(NativeMap { source }).add_subclass(NativeLocalMap))
 }
 
 #[pymethods]
@@ -291,28 +292,23 @@ impl NativeLocalMap {
         slf: PyRef<'py, Self>,
         py: Python<'py>,
         level: u32,
-        region: Option<(String, Vec<f64>)>,
+        region: Option<Shape>,
     ) -> PyResult<(Indices<'py>, f64, Version)> {
         guarded(|| {
             let source = slf.as_super().source.get()?;
             let (service, name) = source.local()?;
-            let region = region.as_ref().map(region_of).transpose()?;
+            let region = region.as_ref().map(Shape::region).transpose()?;
             let listing = wait_for(py, service.list_voxels(name, ListingRequest::of(level, region)))?;
             Ok((indices(py, listing.keys.into_iter())?, listing.resolution_m, told(&listing.version)))
         })
     }
 
     /// Deletes the voxels whose centers lie in a region: how many finest ones went, and the version.
-    fn delete(
-        slf: PyRef<'_, Self>,
-        py: Python<'_>,
-        region: (String, Vec<f64>),
-        level: u32,
-    ) -> PyResult<(usize, Version)> {
+    fn delete(slf: PyRef<'_, Self>, py: Python<'_>, region: Shape, level: u32) -> PyResult<(usize, Version)> {
         guarded(|| {
             let source = slf.as_super().source.get()?;
             let (service, name) = source.local()?;
-            let target = DeletionTarget::Region(region_of(&region)?);
+            let target = DeletionTarget::Region(region.region()?);
             let deletion = Deletion { target, level, request_id: None };
             let deleted = wait_for(py, service.delete_voxels(name, deletion))?;
             Ok((deleted.removed, told(&deleted.version)))

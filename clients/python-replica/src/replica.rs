@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::answers::{Version, told};
 use crate::failure::{Failure, guarded};
-use crate::questions::Questions;
+use crate::questions::NativeMap;
 use crate::source::{OpenSource, Source};
 use crate::waiting::wait_for;
 
@@ -19,7 +19,7 @@ use crate::waiting::wait_for;
 type Status = (Version, u64, bool, u64, Option<String>, f64, bool);
 
 /// A copy of a server's map.
-#[pyclass(frozen, extends = Questions, module = "mrol_replica._native")]
+#[pyclass(frozen, extends = NativeMap, module = "mrol_native")]
 pub(crate) struct NativeReplica {
     /// It copies all of the map, whose hash it knows.
     is_whole: bool,
@@ -87,7 +87,7 @@ impl NativeReplica {
             })?;
             let source = OpenSource::new(Source::Replica(replica));
             let replica = Self { is_whole: options.region.is_none() };
-            Ok(PyClassInitializer::from(Questions { source }).add_subclass(replica))
+            Ok(PyClassInitializer::from(NativeMap { source }).add_subclass(replica))
         })
     }
 

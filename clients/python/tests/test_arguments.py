@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import mrol
+from mrol._transport.caller import Caller
+from mrol._transport.request import Request
 
 from .support.odd import Malicious
 
@@ -53,13 +55,14 @@ def test_numbers_of_every_kind_are_converted(empty: mrol.Map, kind: str) -> None
 
 def test_contiguous_float32_is_not_copied(hall: mrol.Map, monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[int] = []
-    call = mrol.Map._send_bytes  # noqa: SLF001
+    call = Caller.call
 
-    def spy(m: mrol.Map, segment: str, pieces: list[memoryview], *others: Any) -> Any:
-        sent.extend(np.frombuffer(piece, np.uint8).__array_interface__["data"][0] for piece in pieces)
-        return call(m, segment, pieces, *others)
+    def spy(caller: Caller, request: Request, *others: Any) -> Any:
+        assert isinstance(request.body, list)
+        sent.extend(np.frombuffer(piece, np.uint8).__array_interface__["data"][0] for piece in request.body)
+        return call(caller, request, *others)
 
-    monkeypatch.setattr(mrol.Map, "_send_bytes", spy)
+    monkeypatch.setattr(Caller, "call", spy)
     hall.query(POINTS)
     hall.query(POINTS.reshape(10, 100, 3))
     assert sent == [POINTS.__array_interface__["data"][0]] * 2

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import mrol
-from mrol.operations import parts
+from mrol.operations.backend import ServerBackend
+from mrol.questions import group, parts
 
 from .support.scenes import room
 from .support.server import serving
@@ -60,13 +61,15 @@ def test_parts_are_joined_to_the_answer_of_the_whole(hall: mrol.Map, monkeypatch
     whole = ask(hall)
     assert whole.first_version == whole.version
     asked: list[int] = []
-    call = parts.Part.__init__
 
-    def spy(part: parts.Part, of: slice, *others: Any) -> None:
-        asked.append(of.stop - of.start)
-        call(part, of, *others)
+    def spy(ask: Callable[..., Any], *others: Any) -> Any:
+        def counted(part: slice, *options: Any) -> Any:
+            asked.append(part.stop - part.start)
+            return ask(part, *options)
 
-    monkeypatch.setattr(parts.Part, "__init__", spy)
+        return parts.ask_in_parts(counted, *others)
+
+    monkeypatch.setattr(group, "ask_in_parts", spy)
     monkeypatch.setattr(parts, "ELEMENTS_MAX", 7)
     joined = ask(hall)
     monkeypatch.undo()
@@ -143,7 +146,7 @@ def test_what_takes_too_long_at_once_is_cut(tmp_path: Path) -> None:
 
 def between_parts(monkeypatch: pytest.MonkeyPatch, then: Callable[[], object]) -> None:
     """Does something once, after the first part of a query."""
-    call, waiting = mrol.Map._send_bytes, [then]  # noqa: SLF001
+    call, waiting = ServerBackend.query, [then]
 
     def interrupted(*arguments: Any) -> Any:
         answer = call(*arguments)
@@ -151,7 +154,7 @@ def between_parts(monkeypatch: pytest.MonkeyPatch, then: Callable[[], object]) -
             waiting.pop()()
         return answer
 
-    monkeypatch.setattr(mrol.Map, "_send_bytes", interrupted)
+    monkeypatch.setattr(ServerBackend, "query", interrupted)
     monkeypatch.setattr(parts, "ELEMENTS_MAX", 40)
 
 

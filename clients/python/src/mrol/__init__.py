@@ -7,6 +7,7 @@
     m.query([[1, 2, 0.5]]).occupied   # array([ True])
 
 `mrol.connect` has keys, TLS and time-outs, `mrol.Map` all that can be asked of a map, `mrol.errors` what goes wrong.
+`mrol.replica` has maps inside this process, where its extension is installed.
 `python -m mrol` prints how to start.
 """
 
@@ -38,20 +39,12 @@ from .errors import (
 )
 from .map import Map
 from .operations.blocks import DistanceField, VoxelBlocks
-from .operations.checks import Clearances, Collisions, FirstHits
-from .operations.classification import Classification
 from .operations.deletions import Deletion
 from .operations.description import FilterSettings, Level, MapInfo, Sighting, Storage
 from .operations.events import FailedScan, ScanEvent
-from .operations.frontiers import Frontier, Frontiers, FrontierView
-from .operations.grid import Grid, WholeGrid
 from .operations.keep_outs import KeepOut, KeepOutChange, KeepOuts
 from .operations.localization import Candidate, Localization
-from .operations.motions import Motions
-from .operations.nearest import Nearest
 from .operations.observers import Observers, ObservingScan
-from .operations.occupancy import Occupancy
-from .operations.rays import Rays
 from .operations.scans import OpenDirection, RayAgreement, RayCounts, Rival, ScanAnswer
 from .operations.trajectory import MappedScan, Trajectory
 from .operations.undo import Undo
@@ -67,7 +60,18 @@ from .operations.watched import (
     WatchedUndo,
     WatchEvent,
 )
+from .operations.whole_grid import WholeGrid
 from .pose import Pose
+from .questions.all import Questions
+from .questions.checks import Clearances, Collisions, FirstHits
+from .questions.classification import Classification
+from .questions.frontiers import Frontier, Frontiers, FrontierView
+from .questions.grid import Grid
+from .questions.motions import Motions
+from .questions.nearest import Nearest
+from .questions.occupancy import Occupancy
+from .questions.rays import Rays
+from .questions.scope import QuestionScope
 from .shapes import Box, OrientedBox, Prism, Sphere
 from .version import Version, Versioned
 
@@ -123,6 +127,8 @@ __all__ = [
     "PermissionDenied",
     "Pose",
     "Prism",
+    "QuestionScope",
+    "Questions",
     "RayAgreement",
     "RayCounts",
     "Rays",

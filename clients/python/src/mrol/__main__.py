@@ -21,7 +21,7 @@ Then:
     m.insert(np.random.rand(1000, 3), align=False)
     print(m.query([[0.5, 0.5, 0.5], [9, 9, 9]]).occupied)
 
-A map inside this process, without a request for each question or without any server: mrol_replica, beside this package.
+A map inside this process, without a request for each question or without any server: mrol.replica, by an extension.
 
 help(mrol.connect) tells of keys, TLS and time-outs, help(mrol.Map) all that can be asked of a map.
 `python -m mrol ADDRESS` lists the maps of a server; MROL_KEY_FILE names a file with a key.

@@ -8,6 +8,7 @@ the rest   the arrays: this one is n bytes long and begins a bytes after the hea
 
 import json
 import struct
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,39 +16,36 @@ from numpy.typing import NDArray
 
 from ._arrays import F32, U32, Bools, raw
 from ._bits import indices_of, unpacked
-from ._fields import Fields, fields_of, reading
+from ._fields import fields_of, reading
+from .questions.backend import I32, I64, Answer, Names
+from .version import Version
 
 NONE = 0xFFFF_FFFF
 """The number that stands for none."""
 
-I32 = NDArray[np.int32]
-Names = NDArray[np.object_]
-
 Item = TypeVar("Item", bound=np.generic)
 
 
-class Arrays:
-    """The arrays of a question, where they are."""
+def body_of_question(fields: Mapping[str, Any]) -> "list[bytes | memoryview]":
+    """A question's body, in pieces: fields that are arrays stand behind the head, and those that are None are left out."""
+    pieces: list[memoryview] = []
+    text = json.dumps(_placed(fields, pieces), allow_nan=False).encode()
+    return [struct.pack("<I", len(text)) + text, *pieces]
 
-    def __init__(self) -> None:
-        self._pieces: list[memoryview] = []
-        self._bytes = 0
 
-    def add(self, array: NDArray[Any]) -> dict[str, int]:
-        """Puts an array behind the others; what stands for it in the head."""
-        piece = raw(array)
-        place = {"at": self._bytes, "bytes": piece.nbytes}
-        self._pieces.append(piece)
-        self._bytes += piece.nbytes
+def _placed(value: Any, pieces: "list[memoryview]") -> Any:
+    """A field as the head has it: an array is added to the pieces, and its place stands for it."""
+    if isinstance(value, Mapping):
+        return {name: _placed(of, pieces) for name, of in value.items() if of is not None}
+    if isinstance(value, np.ndarray):
+        piece = raw(value)
+        place = {"at": sum(of.nbytes for of in pieces), "bytes": piece.nbytes}
+        pieces.append(piece)
         return place
-
-    def body_of(self, head: dict[str, Any]) -> list[bytes | memoryview]:
-        """The question's body, in pieces."""
-        text = json.dumps(head, allow_nan=False).encode()
-        return [struct.pack("<I", len(text)) + text, *self._pieces]
+    return [_placed(of, pieces) for of in value] if isinstance(value, list) else value
 
 
-class QuestionAnswer:
+class QuestionAnswer(Answer):
     """An answer: its head, and the arrays that the head speaks of."""
 
     def __init__(self, body: memoryview) -> None:
@@ -55,8 +53,9 @@ class QuestionAnswer:
             (length,) = struct.unpack_from("<I", body)
             if length > body.nbytes - 4:
                 raise ValueError(f"a head of {length} bytes in an answer of {body.nbytes}")
-            self.head: Fields = fields_of(body[4 : 4 + length])
-            self._data = body[4 + length :]
+            head = fields_of(body[4 : 4 + length])
+        super().__init__(head, Version.of(head))
+        self._data = body[4 + length :]
 
     def bits(self, name: str, count: int, set_bits: int | None = None) -> Bools:
         """An array of booleans; where the head tells how many are true, so many are."""
@@ -69,7 +68,12 @@ class QuestionAnswer:
             numbers = count * int(np.prod(columns, dtype=np.int64))
             return np.frombuffer(self._bytes(name, 4 * numbers), "<f4").reshape(count, *columns)
 
-    def numbers(self, name: str, count: int) -> NDArray[np.int64]:
+    def finite(self, name: str, count: int) -> F32:
+        """An array of floats; what is not finite stands for none."""
+        floats = self.floats(name, count)
+        return np.where(np.isfinite(floats), floats, np.float32(np.nan))
+
+    def numbers(self, name: str, count: int) -> I64:
         """An array of numbers, in which -1 stands for none."""
         with reading(name):
             numbers = self._unsigned(name, count).astype(np.int64)

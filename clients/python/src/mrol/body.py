@@ -7,8 +7,7 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import F32, Shape, as_floats, as_numbers, number_of, rows_of
-from ._question import Arrays
+from ._arrays import F32, Shape, are_rows, as_floats, as_numbers, number_of, rows_of
 from .errors import ArgumentError, excerpt
 from .pose import Pose, sevens_of
 
@@ -58,19 +57,20 @@ class Body:
             raise ArgumentError("body.links[0].spheres", excerpt(value), "spheres x y z r, shape (n, 4), one or more")
         return cls([value if isinstance(value, Link) else Link(spheres=value)])
 
-    def json(self, arrays: Arrays, bytes_max: int) -> dict[str, Any]:
-        """The body as the head of a question has it; its numbers go into `arrays`."""
+    def fields(self, bytes_max: int) -> dict[str, Any]:
+        """The body as a field of a question: numbers of each link, in arrays of no more bytes than that."""
         links = []
         for number, link in enumerate(self.links):
             name = f"body.links[{number}]"
             spheres, _ = rows_of(link.spheres, 4, f"{name}.spheres", "spheres x y z r, shape (n, 4)", bytes_max)
             points, _ = rows_of(link.points, 3, f"{name}.points", "points x y z, shape (n, 3)", bytes_max)
-            of_link: dict[str, Any] = {"padding_m": number_of(link.padding_m, f"{name}.padding_m")}
-            if len(spheres):
-                of_link["spheres"] = arrays.add(spheres)
-            if len(points):
-                of_link["points"] = arrays.add(points)
-            links.append(of_link)
+            links.append(
+                {
+                    "spheres": spheres if len(spheres) else None,
+                    "points": points if len(points) else None,
+                    "padding_m": number_of(link.padding_m, f"{name}.padding_m"),
+                }
+            )
         return {"links": links}
 
 
@@ -89,13 +89,15 @@ def configurations_of(value: ConfigurationsLike, links: int, argument: str, byte
     """
     axis = "" if links == 1 else f"{links}, "
     expected = f"poses of shape (..., {axis}4, 4), (..., {axis}7) or (..., {axis}3)"
-    sevens = _sevens(value, links, argument, expected)
+    is_sent_as_it_is = are_rows(value, 7, bytes_max)
+    sevens = np.asarray(value) if is_sent_as_it_is else _sevens(value, links, argument, expected)
     lead = sevens.shape[:-1]
     if links != 1:
         if not lead or lead[-1] != links:
             raise ArgumentError(argument, f"shape {sevens.shape}", f"{expected}: the body has {links} links")
         lead = lead[:-1]
-    return as_floats(sevens, argument, expected, bytes_max).reshape(-1, 7), lead
+    floats = sevens if is_sent_as_it_is else as_floats(sevens, argument, expected, bytes_max)
+    return floats.reshape(-1, 7), lead
 
 
 def _sevens(value: Any, links: int, argument: str, expected: str) -> NDArray[Any]:

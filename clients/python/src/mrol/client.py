@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
+from ._arguments import flag_of, word_of
 from ._arrays import number_of, seconds_of, vector_of, whole_of
 from ._fields import Fields, fields_of, reading
 from ._files import File
@@ -24,7 +25,6 @@ from ._transport.tls import tls_context
 from .errors import ArgumentError, BadAnswer, ConnectFailed, ConnectionLost, MrolError, ServerError, WrongPort, excerpt
 from .map import Map
 from .operations.description import FilterSettings, MapInfo, map_info
-from .operations.handle import flag_of, word_of
 from .operations.map_file import FILE_TIMEOUT_S, restore
 from .progress import Progress
 

@@ -2,39 +2,25 @@
 
 from .errors import ArgumentError, excerpt
 from .operations.blocks import BlockOperations
-from .operations.checks import CheckOperations
-from .operations.classification import ClassificationOperations
 from .operations.deletions import DeletionOperations
 from .operations.description import DescriptionOperations
 from .operations.events import EventOperations
-from .operations.frontiers import FrontierOperations
-from .operations.grid import GridOperations
 from .operations.keep_outs import KeepOutOperations
 from .operations.localization import LocalizationOperations
 from .operations.map_file import MapFileOperations
-from .operations.motions import MotionOperations
-from .operations.nearest import NearestOperations
 from .operations.observers import ObserverOperations
-from .operations.occupancy import OccupancyOperations
-from .operations.rays import RayOperations
 from .operations.scans import ScanOperations
 from .operations.trajectory import TrajectoryOperations
 from .operations.undo import UndoOperations
 from .operations.voxels import VoxelOperations
 from .operations.watch import WatchOperations
+from .operations.whole_grid import WholeGridOperations
 
 
 class Map(
-    OccupancyOperations,
     ScanOperations,
     LocalizationOperations,
-    CheckOperations,
-    MotionOperations,
-    RayOperations,
-    NearestOperations,
-    ClassificationOperations,
-    FrontierOperations,
-    GridOperations,
+    WholeGridOperations,
     VoxelOperations,
     BlockOperations,
     ObserverOperations,

@@ -94,6 +94,9 @@ class Prism:
 BoxLike = Union[Box, ArrayLike]
 Shape = Union[Box, Sphere, OrientedBox, Prism]
 
+REGIONS = (Box, Sphere, OrientedBox)
+"""Shapes in which voxels lie, or do not count."""
+
 WORDS: dict[type, str] = {Box: "box", Sphere: "sphere", OrientedBox: "oriented_box", Prism: "prism"}
 KINDS = {word: kind for kind, word in WORDS.items()}
 

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arguments import level_of
 from .._arrays import F32, number_of
 from .._bits import blocks_of, voxels_of
 from .._fields import reading
 from .._transport.request import BYTES, Answer, Parameter, Request
 from ..shapes import Box, BoxLike, OrientedBox
 from ..version import Version, Versioned, whole_header
-from .handle import MapHandle, level_of
+from .handle import MapHandle
 from .region import region_parameters
 
 QUARTERS = 4

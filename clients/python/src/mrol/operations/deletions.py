@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arguments import level_of, word_of
 from .._arrays import as_numbers, raw, rows_of, whole_of
 from .._fields import Fields, fields_of
 from .._sessions import new_request_id
 from .._transport.request import Parameter
 from ..errors import ArgumentError, MrolError, is_outcome_unknown
+from ..questions.occupancy import POINTS
 from ..shapes import KINDS, BoxLike, OrientedBox, Sphere, shape_json, shape_of
 from ..version import Version, Versioned
-from .handle import MapHandle, level_of, word_of
-from .occupancy import POINTS
+from .handle import MapHandle
 
 VOXELS = "indices i j k of voxels, whole numbers of shape (n, 3)"
 

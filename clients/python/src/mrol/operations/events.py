@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arguments import word_of
 from .._arrays import F64, whole_of
 from .._fields import Fields, fields_of, reading
 from .._transport.caller import Caller
@@ -14,7 +15,7 @@ from .._transport.request import Parameter, Request
 from ..errors import server_error
 from ..pose import Pose, pose_in
 from .following import SILENCE_MAX_S, Lines, following
-from .handle import MapHandle, word_of
+from .handle import MapHandle
 from .scans import ScanAnswer, answer_in
 
 STATUS = {

@@ -5,6 +5,7 @@ from datetime import datetime, timezone
 
 from numpy.typing import ArrayLike
 
+from .._arguments import word_of
 from .._arrays import whole_of
 from .._fields import Fields, fields_of
 from .._sessions import new_request_id
@@ -12,7 +13,7 @@ from .._transport.request import Request
 from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
 from ..shapes import KINDS, BoxLike, OrientedBox, Prism, Shape, Sphere, shape_in, shape_json, shape_of
 from ..version import Version, Versioned
-from .handle import MapHandle, word_of
+from .handle import MapHandle
 
 EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 

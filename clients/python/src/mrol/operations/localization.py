@@ -9,10 +9,10 @@ from .._fields import Fields, fields_of
 from .._transport.request import Parameter
 from ..errors import ArgumentError
 from ..pose import Pose, pose_in
+from ..questions.occupancy import POINTS
 from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
 from .handle import MapHandle
-from .occupancy import POINTS
 from .scans import RayAgreement, Rival, rays_in, rivals_in
 
 

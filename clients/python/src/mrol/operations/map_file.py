@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from io import FileIO
 from typing import IO
 
+from .._arguments import flag_of
 from .._fields import fields_of
 from .._files import File, open_regular, path_of_file, replacing
 from .._transport.caller import Body, Caller
@@ -15,7 +16,7 @@ from ..errors import ArgumentError, BadAnswer, ConnectionLost, MrolError, excerp
 from ..progress import Progress, Told, checked_progress, progress_of
 from ..version import Version
 from .description import MapInfo, map_info
-from .handle import MapHandle, flag_of
+from .handle import MapHandle
 
 FILE_TIMEOUT_S = 600.0
 """How long a file may take."""

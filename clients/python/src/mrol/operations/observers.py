@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from .._arguments import level_of
 from .._arrays import numbers_text, vector_of
 from .._fields import Fields, reading
 from ..errors import ArgumentError, excerpt
 from ..pose import Pose, pose_in
 from ..version import Version, Versioned
-from .handle import MapHandle, level_of
+from .handle import MapHandle
 
 
 @dataclass(frozen=True, eq=False)

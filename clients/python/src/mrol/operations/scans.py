@@ -6,15 +6,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arguments import flag_of, level_of, text_of, word_of
 from .._arrays import F64, Bools, as_floats, as_numbers, number_of, numbers_text, raw, rows_of, vector_of, whole_of
 from .._fields import Fields, fields_of, reading
 from .._transport.request import Answer, Parameter
 from ..errors import ArgumentError, MrolError, is_outcome_unknown
 from ..pose import Pose, PoseLike, pose_in
+from ..questions.occupancy import POINTS
 from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
-from .handle import MapHandle, flag_of, level_of, text_of, word_of
-from .occupancy import POINTS
+from .handle import MapHandle
 
 Method = Literal["refined", "overlap"]
 

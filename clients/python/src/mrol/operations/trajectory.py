@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arguments import word_of
 from .._arrays import F64, whole_of
 from .._fields import Fields
 from ..pose import Pose, pose_in
 from ..version import Version, Versioned
-from .handle import MapHandle, word_of
+from .handle import MapHandle
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Any
 
+from .._arguments import text_of, word_of
 from .._arrays import whole_of
 from .._sessions import new_request_id
 from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
 from ..version import Version, Versioned
 from .deletions import Deletion
-from .handle import MapHandle, text_of, word_of
+from .handle import MapHandle
 from .scans import ScanAnswer
 
 

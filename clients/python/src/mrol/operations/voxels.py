@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._arguments import flag_of, level_of
 from .._arrays import F64, numbers_text, vector_of
 from .._fields import Fields, reading
 from .._transport.request import Parameter
@@ -14,7 +15,7 @@ from ..errors import ArgumentError, excerpt
 from ..pose import Pose, PoseLike
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
-from .handle import MapHandle, flag_of, level_of
+from .handle import MapHandle
 from .region import region_parameters
 
 ARRAY = b'"voxels":['

@@ -4,6 +4,7 @@ from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import replace
 
+from .._arguments import flag_of, level_of, word_of
 from .._arrays import whole_of
 from .._fields import reading
 from .._protobuf import Message
@@ -16,7 +17,7 @@ from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
 from .following import SILENCE_MAX_S, following
 from .framing import failure_of, next_message
-from .handle import MapHandle, flag_of, level_of, word_of
+from .handle import MapHandle
 from .region import region_parameters
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
 

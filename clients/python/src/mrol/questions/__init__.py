@@ -1,0 +1,1 @@
+"""What a map is asked, by whatever answers: each module has one question, or two that belong together, and its answer."""
