@@ -69,7 +69,7 @@ class NativeMap:
         unknown: str,
     ) -> _Fields: ...
     def motion_is_free(
-        self, body: NativeBody, configurations: _F32, *, unknown_is_occupied: bool = False, **scope: object
+        self, body: NativeBody, configurations: _F32, *, unknown_is_occupied: bool = False, scope: _Scope = None
     ) -> bool: ...
     def rays(
         self,

@@ -180,10 +180,10 @@ impl NativeMap {
     }
 
     /// Is one motion free? For the innermost loop of a planner: no array is made, and nothing is checked that the
-    /// question does not check itself.
+    /// question does not check itself. Options are a dictionary, since a call that takes any keywords is slower.
     #[pyo3(
-        signature = (body, configurations, *, unknown_is_occupied = None, **scope),
-        text_signature = "($self, body, configurations, *, unknown_is_occupied=False, **scope)"
+        signature = (body, configurations, *, unknown_is_occupied = None, scope = None),
+        text_signature = "($self, body, configurations, *, unknown_is_occupied=False, scope=None)"
     )]
     fn motion_is_free(
         &self,
@@ -191,11 +191,11 @@ impl NativeMap {
         body: &Bound<'_, PyAny>,
         configurations: &Bound<'_, PyAny>,
         unknown_is_occupied: Option<&Bound<'_, PyAny>>,
-        scope: Option<&Bound<'_, PyDict>>,
+        scope: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<bool> {
         guarded(|| {
             let body = body.cast::<NativeBody>().map_err(|_| argument("body", body, "a PreparedBody"))?.get();
-            let asked = Scope::asked(scope.map(Scope::of).transpose()?);
+            let asked = Scope::asked(scope.map(|scope| scope.extract()).transpose()?);
             let is_occupied = unknown_is_occupied.map(|value| flag_of("unknown_is_occupied", value));
             let unknown = match is_occupied.transpose()? {
                 Some(true) => Unknown::Occupied,

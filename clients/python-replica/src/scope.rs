@@ -19,7 +19,7 @@ impl Scope {
     }
 
     /// The options that a dictionary has.
-    pub(crate) fn of(given: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn of(given: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut asked = Asked::default();
         for (name, value) in given {
             let name: PyBackedStr = name.extract()?;
@@ -50,7 +50,8 @@ impl<'py> FromPyObject<'_, 'py> for Scope {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        Self::of(&*object.cast::<PyDict>()?)
+        let given = object.cast::<PyDict>().map_err(|_| argument("scope", &object, "a dict of options"))?;
+        Self::of(&given)
     }
 }
 

@@ -166,7 +166,9 @@ def test_the_way_for_planners_takes_what_it_says(replica: mrol.replica.Replica) 
     with pytest.raises(mrol.ArgumentError, match="body must be a PreparedBody"):
         replica.motion_is_free([[0, 0, 0, 0.2]], edge)  # type: ignore[arg-type]
     with pytest.raises(mrol.ArgumentError, match="level must be a whole number"):
-        replica.motion_is_free(body, edge, level=-1)
+        replica.motion_is_free(body, edge, scope={"level": -1})
+    with pytest.raises(mrol.ArgumentError, match="scope must be a dict of options"):
+        replica.motion_is_free(body, edge, scope=["level"])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="contiguous"):
         replica.motion_is_free(body, np.repeat(edge, 2, axis=1)[:, ::2])
     with pytest.raises(ValueError, match="contiguous"):

@@ -82,6 +82,9 @@ def ask_all(asked: Any, operation: str, argument: str, call: dict[str, Any]) -> 
         if (argument == "min_revision" and odd == "five") or (odd == "None" and (operation, argument) in TOGETHER):
             # The copy has no such revision, and a map without a server would wait for it; and None is to give nothing.
             continue
+        if (operation, argument, odd) == ("motion_is_free", "scope", "a dict"):
+            # What is no option is a TypeError, as a keyword that is none.
+            continue
         given = {**call, argument: value}
         if (operation, argument) == ("localize", "gravity_in_map"):
             given["gravity_in_sensor"] = [0, 0, -1]

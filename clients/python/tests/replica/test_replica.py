@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -162,7 +163,12 @@ def test_a_revision_and_a_map_are_asked_for(server: Server, hall: mrol.Map, repl
 def test_wrong_options_are_named(replica: mrol.replica.Replica) -> None:
     body, way = mrol.replica.PreparedBody([[0, 0, 0, 0.25]]), np.ascontiguousarray(POSES[:2])
     wrong: dict[str, Any] = {"levl": 1}
-    for ask in (partial(replica.query, POINTS), partial(replica.nearest, POINTS, 1.0), partial(replica.motion_is_free, body, way)):
+    several: list[Callable[..., object]] = [
+        partial(replica.query, POINTS),
+        partial(replica.nearest, POINTS, 1.0),
+        lambda **scope: replica.motion_is_free(body, way, scope=scope),  # type: ignore[arg-type]
+    ]
+    for ask in several:
         with pytest.raises(TypeError, match="got an unexpected keyword argument 'levl'"):
             ask(**wrong)
         for name, value in {"level": -1, "min_revision": 0.5, "map_uuid": 5}.items():
@@ -170,10 +176,10 @@ def test_wrong_options_are_named(replica: mrol.replica.Replica) -> None:
                 ask(**{name: value})
             assert refused.value.argument == name
     here = replica.status.version
-    known: dict[str, Any] = {"level": 0, "ignore_keep_outs": True, "min_revision": here.revision, "map_uuid": here.map_uuid}
-    assert replica.motion_is_free(body, way, **known) == replica.check_motions(body, way, ignore_keep_outs=True).free
+    known: mrol.QuestionScope = {"level": 0, "ignore_keep_outs": True, "min_revision": here.revision, "map_uuid": here.map_uuid}
+    assert replica.motion_is_free(body, way, scope=known) == replica.check_motions(body, way, ignore_keep_outs=True).free
     with pytest.raises(mrol.FailedPrecondition, match="map_replaced"):
-        replica.motion_is_free(body, way, map_uuid="00000000-0000-0000-0000-000000000000")
+        replica.motion_is_free(body, way, scope={"map_uuid": "00000000-0000-0000-0000-000000000000"})
     # On the class, whose documentation it has, it is the same.
     assert mrol.replica.Replica.motion_is_free(replica, body, way) == replica.motion_is_free(body, way)
 

@@ -1,18 +1,15 @@
 """What replicas and maps without a server have in common."""
 
 from types import TracebackType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from .._arrays import F32
 from ..errors import ArgumentError, excerpt
 from ..questions.all import Questions
-from ..questions.scope import QUESTION, QuestionScope
+from ..questions.scope import QuestionScope
 from .backend import NativeBackend
 from .body import PreparedBody
 from .native import mrol_native
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
 Opened = TypeVar("Opened", bound="InProcessMap")
 
@@ -30,16 +27,16 @@ class InProcessMap(Questions):
         # The innermost loop of a planner calls the extension itself.
         vars(self)["motion_is_free"] = native.motion_is_free
 
-    @QUESTION.documented
     def motion_is_free(
-        self, body: PreparedBody, configurations: F32, *, unknown_is_occupied: bool = False, **scope: "Unpack[QuestionScope]"
+        self, body: PreparedBody, configurations: F32, *, unknown_is_occupied: bool = False, scope: "QuestionScope | None" = None
     ) -> bool:
         """Whether one motion is free, for the innermost loop of a planner.
 
         `configurations` is contiguous and aligned float32 with two or more rows of x y z qx qy qz qw for each link: nothing is
-        converted, and anything else is refused.
+        converted, and anything else is refused. `scope` has the options of all questions, `{"level": 1}` for example, in a dict:
+        a call that takes them as keywords is slower.
         """
-        return self._native.motion_is_free(body, configurations, unknown_is_occupied=unknown_is_occupied, **scope)
+        return self._native.motion_is_free(body, configurations, unknown_is_occupied=unknown_is_occupied, scope=scope)
 
     def close(self) -> None:
         """Gives its memory back, once the last call that uses it returns. Every later call is an error."""
