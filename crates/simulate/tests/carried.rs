@@ -214,3 +214,33 @@ fn a_robot_that_was_turned_in_place_against_its_odometry_is_not_believed_elsewhe
         mapped.assert_not_misled(&points, standing, &truth, 2.0 * RESOLUTION_M);
     }
 }
+
+/// The floor and the ceiling are hardly in view of both sensors, so that little holds the height of the second one: the
+/// guess is as likely as where its surfaces pull the scan.
+#[test]
+fn a_true_guess_of_another_height_is_not_overruled_where_rays_cannot_tell() {
+    let lidar =
+        SpinningLidar { rings: 16, azimuths: 900, elevation_max_deg: 15.0, ..SpinningLidar::default() };
+    for seed in 0..24 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mapped = Mapped::new(RESOLUTION_M);
+        let room = Scene::furnished(seed);
+        let mut place = |z: f64| {
+            at(
+                random.random_range(4.0..6.0),
+                random.random_range(3.0..5.0),
+                z,
+                random.random_range(-3.0..3.0),
+            )
+        };
+        let (first, truth) = (place(0.5), place(0.5 + 0.3 * (1 + seed % 4) as f64));
+        let mut scan = |place: &Pose| finite(lidar.scan(&room, place, &mut random));
+        let (before, points) = (scan(&first), scan(&truth));
+        if before.len().min(points.len()) < 5000 {
+            // In a piece of furniture.
+            continue;
+        }
+        mapped.add(&before, first);
+        mapped.assert_not_misled(&points, Guess::Pose(truth), &truth, 4.0 * RESOLUTION_M);
+    }
+}

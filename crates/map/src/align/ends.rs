@@ -208,8 +208,7 @@ impl<'a> Ends<'a> {
             return Some((Verdict::LowOverlap, reason));
         }
         let from_guess = self.prior.map(|prior| pose_difference(&prior.guess, &found.map_from_sensor).0);
-        let tilt_deg = self.prior.map_or(0.0, |prior| tilt_deg(&prior.guess, &found.map_from_sensor));
-        let is_near = from_guess.is_some_and(|meters| meters <= NEAR_M) && tilt_deg <= NEAR_TILT_DEG;
+        let is_near = self.is_near(&found.map_from_sensor);
         let share = if is_near { agreement.better() } else { agreement.worse() };
         if share < AGREEMENT_MIN {
             let (a, b) = (of_scan.contradicted_share(), of_map.contradicted_share());
@@ -222,6 +221,27 @@ impl<'a> Ends<'a> {
         let far_m = from_guess.filter(|meters| *meters > REACH_M)?;
         let reason = format!("it is {far_m:.2} m from the guess, others were looked for up to {REACH_M} m");
         Some((Verdict::Ambiguous, reason))
+    }
+
+    /// True of a pose near its guess. Farther away some pose of many fits by chance.
+    fn is_near(&self, pose: &Pose) -> bool {
+        self.prior.is_some_and(|prior| {
+            pose_difference(&prior.guess, pose).0 <= NEAR_M && tilt_deg(&prior.guess, pose) <= NEAR_TILT_DEG
+        })
+    }
+
+    /// Why the best of all ends is not to be believed, though nothing better was found: far from its guess, nothing but
+    /// rays speaks for it, and they contradict it both ways.
+    pub(super) fn reason_against_best(&self, best: &End) -> Option<String> {
+        let is_far = self.prior.is_some() && !self.is_near(&best.fit.map_from_sensor);
+        let (a, b) =
+            (best.agreement.of_scan.contradicted_share(), best.agreement.of_map.contradicted_share());
+        (is_far && !self.is_usual(best)).then(|| {
+            format!(
+                "{a:.3} of the scan's points and {b:.3} of what earlier scans met are contradicted, so far from the \
+                 guess: more on both sides than earlier scans contradict each other"
+            )
+        })
     }
 
     /// The end that rays contradict least, of those that may be believed.
@@ -289,8 +309,8 @@ impl<'a> Ends<'a> {
         most > CONTRADICTED_MIN && most > UNUSUAL * self.contradicted_among_witnesses()
     }
 
-    /// The guess as a rival: where the scan would show new ground there, or where `best` is more than three standard
-    /// deviations away from it.
+    /// The guess as a rival, which is as likely as `best` if rays do not tell them apart: where the scan would show new
+    /// ground there, where what it shows holds it in no direction, and where things moved with the robot.
     ///
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
     fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {
@@ -300,10 +320,8 @@ impl<'a> Ends<'a> {
         }
         let look = Look::of(self.rays, &map_from_sensor, &self.witnesses, self.stop);
         let agreement = look.agreement();
-        let is_far = best.deviations * best.deviations > RIVAL;
-        let is_possible = is_hardly_contradicted(&agreement) && (is_far || !has_evidence(&agreement));
         let is_as_likely = cost(0.0, &look, &preferred.look) - best.cost(preferred) <= RIVAL;
-        (is_possible && is_as_likely).then_some(Rival { map_from_sensor, agreement })
+        (is_hardly_contradicted(&agreement) && is_as_likely).then_some(Rival { map_from_sensor, agreement })
     }
 
     /// How rays agree at some other pose.

@@ -156,6 +156,9 @@ impl Contest<'_> {
             );
             return (Verdict::Ambiguous, reason, rivals);
         }
+        if let Some(reason) = ends.reason_against_best(best) {
+            return (Verdict::Contradicted, reason, Vec::new());
+        }
         if let Some(aside) = self.slides_to(best, ends) {
             return (Verdict::Undetermined, format!("{agree}, and as well {aside}"), Vec::new());
         }
