@@ -48,7 +48,8 @@ other scans are sent all the same, and the exit code is then 3. It is 1 where sc
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Insert {
-    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
+    /// .f32
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]

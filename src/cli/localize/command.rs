@@ -41,7 +41,8 @@ may be 2 degrees off.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Localize {
-    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin .f32
+    /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
+    /// .f32
     #[arg(required = true, value_name = "SCAN")]
     scans: Vec<PathBuf>,
     /// A map file, as `mrol map --out` writes it
