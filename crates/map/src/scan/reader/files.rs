@@ -16,15 +16,15 @@ use crate::geometry::Point;
 
 /// The points of the scan file at `path`, in the sensor frame, meters.
 ///
-/// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
-/// binary, binary_compressed), `.xyz` (text: the first three columns, or those that a line of names says, divided by
-/// spaces, commas or semicolons; `#`, `//` or `%` starts a comment), `.npy` (an array of shape (..., 3), or with columns
-/// behind x y z), `.bin` (little-endian float32 x y z i), `.f32` (x y z). Points that are not finite are kept: they mean
-/// "no return". Coordinates are rounded to f32, see [`read_exact_points`].
+/// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii, binary,
+/// binary_compressed), `.xyz` (text: the first three columns, or those that a line of names says, divided by spaces,
+/// commas or semicolons; `#`, `//` or `%` starts a comment), `.npy` (an array of shape (..., 3), or with columns behind
+/// x y z), `.bin` (little-endian float32 x y z i), `.f32` (x y z). Points that are not finite are kept: they mean "no
+/// return". Coordinates are rounded to f32, see [`read_exact_points`].
 ///
 /// # Errors
-/// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
-/// the error names the file and the line, byte or element. Bare floats that look like rows of another length are refused
+/// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated; the
+/// error names the file and the line, byte or element. Bare floats that look like rows of another length are refused
 /// too, naming the [`Columns`] that they seem to have.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
     read(path, None)

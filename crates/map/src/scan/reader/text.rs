@@ -9,8 +9,8 @@ use super::lines::{Lines, check_text, comment, text_of};
 /// Columns of x, y and z where no line of names says others.
 const FIRST_COLUMNS: [usize; 3] = [0, 1, 2];
 
-/// The points of an `.xyz` file: x y z are the columns that somebody named, those that a line of names before them says,
-/// or the first three.
+/// The points of an `.xyz` file: x y z are the columns that somebody named, those that a line of names before them
+/// says, or the first three.
 pub(super) fn points<C: Coordinates>(bytes: &[u8], named: Option<Columns>) -> Result<Vec<C>, Problem> {
     check_text(bytes)?;
     let mut lines = Lines::of(bytes);
