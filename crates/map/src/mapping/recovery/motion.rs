@@ -1,6 +1,6 @@
 //! The motion between two scans, by aligning one to the other.
 
-use crate::align::{AlignmentSettings, PoseCovariance, PosePrior, Verdict, align_until};
+use crate::align::{AlignmentSettings, PoseCovariance, PosePrior, Rival, Verdict, align_until};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, ViewpointRecord};
 use crate::util::StopSignal;
@@ -35,5 +35,12 @@ pub(super) fn motion_between(
     let expected = Some(PoseCovariance::isotropic(MOVED_M, MOVED_DEG.to_radians()));
     let prior = PosePrior { expected, ..Pose::identity().into() };
     let found = align_until(&map, now, &prior, alignment, stop);
-    (found.verdict == Verdict::Accepted && !stop.is_stopped()).then_some(found.map_from_sensor)
+    // Nobody says that the sensor stood still: that it may have is no doubt about what was found.
+    let may_have_stood = |rivals: &[Rival]| matches!(rivals, [rival] if rival.map_from_sensor == prior.guess);
+    let is_found = match found.verdict {
+        Verdict::Accepted => true,
+        Verdict::Ambiguous => may_have_stood(&found.rivals),
+        Verdict::LowOverlap | Verdict::Undetermined | Verdict::Contradicted => false,
+    };
+    (is_found && !stop.is_stopped()).then_some(found.map_from_sensor)
 }
