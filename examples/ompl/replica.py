@@ -11,7 +11,7 @@ from checker import Bools, Places, padding_between_checks
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "clients" / "c" / "examples"))
 from follow import Answer, Copy, Error, Replica  # noqa: E402
-from motions import Body, Link, MotionAnswers, MotionCheck, Region  # noqa: E402
+from motions import Body, Link, MotionAnswers, MotionCheck, Region, Scope  # noqa: E402
 
 MOTIONS_FIRST = 16
 
@@ -19,14 +19,15 @@ MOTIONS_FIRST = 16
 class PoseCheck(Structure):
     _fields_ = [
         ("struct_size", c_size_t),
+        ("scope", Scope),
         ("body", Body),
         ("configurations", POINTER(c_float)),
         ("count", c_size_t),
         ("ignored", POINTER(Region)),
         ("ignored_count", c_size_t),
-        ("level", c_uint32),
         ("clearance_max_m", c_float),
-        ("reserved", c_uint8 * 8),
+        ("unknown_is_occupied", c_uint8),
+        ("reserved", c_uint8 * 3),
     ]
 
 
