@@ -309,8 +309,8 @@ impl<'a> Ends<'a> {
         most > CONTRADICTED_MIN && most > UNUSUAL * self.contradicted_among_witnesses()
     }
 
-    /// The guess as a rival, which is as likely as `best` if rays do not tell them apart: where the scan would show new
-    /// ground there, where what it shows holds it in no direction, and where things moved with the robot.
+    /// The guess as a rival, where rays do not tell it from `best`: the scan would show new ground there, or little
+    /// that it shows holds it.
     ///
     /// A pose elsewhere at which the scan would show new ground only is no rival: there are always some.
     fn rival_at_guess(&self, best: &End, preferred: &End) -> Option<Rival> {
