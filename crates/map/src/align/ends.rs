@@ -1,12 +1,14 @@
 //! Ends: where ascents ended, with what is known beforehand and what rays say for and against each.
 
-use std::cmp::Ordering;
-
 use nalgebra::Vector3;
 
 use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
+use super::evidence::{
+    AGREEMENT_MIN, EVIDENCE_MIN, EVIDENCE_OF_BOTH_MIN, has_evidence, in_rank, is_hardly_contradicted,
+    vouched_share,
+};
 use super::fit::Fit;
-use super::look::Look;
+use super::look::{Look, is_contradicted_times_as_much};
 use super::prior::{PosePrior, WIDE_DEG, WIDE_M};
 use super::sampled_scan::SampledScan;
 use super::settings::{AlignmentSettings, DEVIATIONS_MAX};
@@ -20,13 +22,6 @@ use crate::util::StopSignal;
 /// Poses that differ by less than this many r_0 and less than [`SAME_DEG`] are the same place.
 const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
-/// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
-/// nothing of each other cannot be compared.
-const EVIDENCE_MIN: f64 = 0.2;
-const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
-/// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
-/// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
-const AGREEMENT_MIN: f64 = 0.9;
 /// A pose is near its guess within so many meters, three quarters of a standard deviation of a guess of which nothing
 /// else is known, and a tilt of one, degrees; other places are looked for up to so many meters, three of them. Its yaw
 /// does not count: the robot may have been turned unseen.
@@ -209,11 +204,11 @@ impl<'a> Ends<'a> {
         }
         let from_guess = self.prior.map(|prior| pose_difference(&prior.guess, &found.map_from_sensor).0);
         let is_near = self.is_near(&found.map_from_sensor);
-        let share = if is_near { agreement.better() } else { agreement.worse() };
+        let share = if is_near { vouched_share(agreement) } else { agreement.worse() };
         if share < AGREEMENT_MIN {
             let (a, b) = (of_scan.contradicted_share(), of_map.contradicted_share());
             let words = "of the scan's points and of what earlier scans met are contradicted";
-            let sides = if is_near { "of both" } else { "of one, so far from the guess," };
+            let sides = if is_near { "of each that shows enough" } else { "of one, so far from the guess," };
             let most = 1.0 - AGREEMENT_MIN;
             let reason = format!("{a:.3} and {b:.3} {words}: at most {most:.1} {sides} may be");
             return Some((Verdict::Contradicted, reason));
@@ -324,9 +319,9 @@ impl<'a> Ends<'a> {
         (is_hardly_contradicted(&agreement) && is_as_likely).then_some(Rival { map_from_sensor, agreement })
     }
 
-    /// How rays agree at some other pose.
-    pub(super) fn agreement_at(&self, pose: &Pose) -> RayAgreement {
-        Look::of(self.rays, pose, &self.witnesses, self.stop).agreement()
+    /// True where rays contradict `pose` at least `times` times as much as an end, on one side or both.
+    pub(super) fn is_held_against(&self, end: &End, pose: &Pose, times: f64) -> bool {
+        is_contradicted_times_as_much(self.rays, pose, &self.witnesses, &end.agreement, times)
     }
 
     /// The share of what each witness met that another one contradicts.
@@ -368,29 +363,6 @@ impl End {
     }
 }
 
-/// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is
-/// known.
-fn is_hardly_contradicted(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
-    of_scan.contradicted_share().min(of_map.contradicted_share()) <= 1.0 - AGREEMENT_MIN
-}
-
-/// True of a pose at which the scan and earlier scans saw enough of each other to be compared.
-fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
-    let (a, b) = (of_scan.evidence(), of_map.evidence());
-    a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
-}
-
-/// The order of places that a search found, each with how rays agree there and its overlap: first those at which the
-/// scan and earlier scans saw enough of each other, by the smaller share of rays that agree; then the others, by
-/// overlap.
-fn in_rank(
-    (rays, overlap): &(RayAgreement, f64),
-    (of_other, overlap_of_other): &(RayAgreement, f64),
-) -> Ordering {
-    let share = |rays: &RayAgreement| if has_evidence(rays) { rays.worse() } else { -1.0 };
-    share(of_other).total_cmp(&share(rays)).then(overlap_of_other.total_cmp(overlap))
-}
-
 /// [`End::cost`] of a pose that is so many standard deviations from the guess.
 fn cost(deviations: f64, look: &Look, preferred: &Look) -> f64 {
     let z = look.contradicted_more_than(preferred).max(0.0);
@@ -400,23 +372,4 @@ fn cost(deviations: f64, look: &Look, preferred: &Look) -> f64 {
 /// What is known beforehand against a pose that is so many standard deviations from the guess, squared ones.
 pub(super) fn cost_of_prior(deviations: f64) -> f64 {
     deviations.min(DEVIATIONS_MAX).powi(2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_are_ranked_by_the_rays_that_agree_and_by_overlap_where_nothing_is_known() {
-        let place = |agree: usize, contradicted: usize, overlap: f64| {
-            let counts = |agree, contradicted| RayCounts { asked: 800, agree, contradicted };
-            (RayAgreement { of_scan: counts(agree, 0), of_map: counts(agree, contradicted) }, overlap)
-        };
-        let (agreed, contradicted) = (place(700, 10, 0.3), place(700, 70, 0.9));
-        let (unseen_dense, unseen_sparse) = (place(30, 0, 0.95), place(30, 0, 0.5));
-        let of_less_overlap = place(700, 10, 0.2);
-        let mut places = [unseen_sparse, of_less_overlap, contradicted, unseen_dense, agreed];
-        places.sort_by(in_rank);
-        assert_eq!(places, [agreed, of_less_overlap, contradicted, unseen_dense, unseen_sparse]);
-    }
 }

@@ -28,23 +28,18 @@ impl Look {
         if stop.is_stopped() {
             return Self { of_scan: Vec::new(), of_map: Vec::new() };
         }
-        let of_scan = rays.points.iter().map(|point| {
-            let sights = witnesses.viewpoints.iter().map(|viewpoint| rays.sight_of(viewpoint, pose, *point));
-            majority(sights)
-        });
-        let sensor_from_map = pose.inverse();
-        let of_map = witnesses.met.iter().map(|&MetInMap { place_m, error_m }| {
-            let offset = sensor_from_map * Point3::from(place_m);
-            rays.image.sight(offset.coords.map(|c| c as f32).into(), rays.tolerance_m + error_m)
-        });
-        Self { of_scan: of_scan.collect(), of_map: of_map.collect() }
+        Self {
+            of_scan: sights_of_scan(rays, pose, witnesses).collect(),
+            of_map: sights_of_map(rays, pose, witnesses).collect(),
+        }
     }
 
     /// How many points agree, and how many are contradicted.
     pub(super) fn agreement(&self) -> RayAgreement {
-        // New ground is what the scan shows and nobody saw; what it does not look at is nothing to it.
-        let in_view = self.of_map.iter().copied().filter(|sight| *sight != Sight::NotSeen);
-        RayAgreement { of_scan: RayCounts::of(self.of_scan.iter().copied()), of_map: RayCounts::of(in_view) }
+        RayAgreement {
+            of_scan: RayCounts::of(self.of_scan.iter().copied()),
+            of_map: RayCounts::of(in_view(self.of_map.iter().copied())),
+        }
     }
 
     /// How much more this pose is contradicted than another one with the same witnesses, in standard deviations of the
@@ -61,6 +56,45 @@ impl Look {
         });
         if here + there == 0.0 { 0.0 } else { (here - there) / f64::sqrt(here + there) / CLUSTERING }
     }
+}
+
+/// What the witnesses say of each point of a scan at a pose.
+fn sights_of_scan(rays: &Rays, pose: &Pose, witnesses: &Witnesses) -> impl Iterator<Item = Sight> {
+    rays.points.iter().map(|point| {
+        majority(witnesses.viewpoints.iter().map(|viewpoint| rays.sight_of(viewpoint, pose, *point)))
+    })
+}
+
+/// What a scan at a pose says of each place that the witnesses met.
+fn sights_of_map(rays: &Rays, pose: &Pose, witnesses: &Witnesses) -> impl Iterator<Item = Sight> {
+    let sensor_from_map = pose.inverse();
+    witnesses.met.iter().map(move |&MetInMap { place_m, error_m }| {
+        let offset = sensor_from_map * Point3::from(place_m);
+        rays.image.sight(offset.coords.map(|c| c as f32).into(), rays.tolerance_m + error_m)
+    })
+}
+
+/// Those of what the scan looks at: new ground is what it shows and nobody saw; what it does not look at is nothing to
+/// it.
+fn in_view(sights: impl Iterator<Item = Sight>) -> impl Iterator<Item = Sight> {
+    sights.filter(|sight| *sight != Sight::NotSeen)
+}
+
+/// True where a pose is contradicted `times` times as much as `agreement` says of another one, on one side at least.
+/// One point more or less is chance.
+pub(super) fn is_contradicted_times_as_much(
+    rays: &Rays,
+    pose: &Pose,
+    witnesses: &Witnesses,
+    agreement: &RayAgreement,
+    times: f64,
+) -> bool {
+    let is_more = |here: RayCounts, there: RayCounts| {
+        (there.contradicted + 1) as f64 >= times * (here.contradicted + 1) as f64
+    };
+    // Mostly one side tells.
+    is_more(agreement.of_scan, RayCounts::of(sights_of_scan(rays, pose, witnesses)))
+        || is_more(agreement.of_map, RayCounts::of(in_view(sights_of_map(rays, pose, witnesses))))
 }
 
 /// What most of those say that say anything; agreement of as many as contradict.

@@ -11,6 +11,7 @@
 //! fit                                   how the scan fits at a pose, and what holds it there (information, slide)
 //! verdict                               whether to believe the pose, and what is told of it
 //! agreement       Rays, RayAgreement    the rays of a scan, and how many agree
+//! evidence                              how much they saw of each other, and which side vouches for a pose
 //! look            ray_agreement         what rays say of a scan at a pose, point by point
 //! witnesses                             which earlier scans are asked, and what they met
 //! marched                               what earlier scans must have seen, where they left no viewpoints
@@ -30,6 +31,7 @@ mod agreement;
 mod ascent;
 mod elsewhere;
 mod ends;
+mod evidence;
 mod extent;
 mod fit;
 mod gravity;

@@ -7,7 +7,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 
-use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
+use super::agreement::{RayAgreement, Rays, Rival};
 use super::ascent::Ascent;
 use super::elsewhere::{LEVEL_OF_SHIFTS, LEVEL_OF_TURNS, on_other_floors, shifted, turned};
 use super::ends::{End, Ends, REACH_M, RIVAL, cost_of_prior};
@@ -188,7 +188,7 @@ impl Contest<'_> {
             let aside = Pose::from_parts(shift * pose.translation, turn * pose.rotation);
             // Most are ruled out by what is known beforehand, without a look.
             let farther = cost_of_prior(ends.deviations(&aside)) - cost_of_prior(end.deviations);
-            farther <= RIVAL && contrast(&end.agreement, &ends.agreement_at(&aside)) < CONTRAST_MIN
+            farther <= RIVAL && !ends.is_held_against(end, &aside, CONTRAST_MIN)
         };
         let (shift, degrees) = shifts.into_iter().chain(turns).find(is_open)?;
         Some(match degrees == 0.0 {
@@ -203,14 +203,6 @@ fn least_held(found: &Fit) -> Option<Vector2<f64>> {
     let directions = found.information.directions().into_iter();
     let on_floor = directions.map(|open| Vector2::new(open.direction[0], open.direction[1]));
     on_floor.into_iter().find(|axis| axis.norm() > 0.7).map(|axis| axis.normalize())
-}
-
-/// How many times as much is contradicted at a pose aside, of the side of which that is more: people contradict one
-/// side wherever the scan is put. One point more or less is chance.
-fn contrast(here: &RayAgreement, there: &RayAgreement) -> f64 {
-    let of =
-        |here: RayCounts, there: RayCounts| (there.contradicted + 1) as f64 / (here.contradicted + 1) as f64;
-    of(here.of_scan, there.of_scan).max(of(here.of_map, there.of_map))
 }
 
 /// Says how rays agree at a pose.
