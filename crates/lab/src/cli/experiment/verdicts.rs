@@ -17,6 +17,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol-lab experiment verdicts                                     simulated places alone
   mrol-lab experiment verdicts hall/:0.1:hall street/:0.2:street   and two sets of real scans
+  mrol-lab experiment verdicts --sequences hall/:0.1:hall          a set's scans in their order
 
 Each argument is a folder of scans with poses.txt (a TUM file, line k for scan k), the side of a voxel, and the name
 of the place. Its scans are aligned to maps of one, two and half of them, from guesses 0.1 m and 3 degrees to 8 m and
@@ -48,6 +49,9 @@ pub(super) struct Verdicts {
     /// Maps of the sets keep no viewpoints, as those from before there were any
     #[arg(long)]
     no_viewpoints: bool,
+    /// Map all scans of each set in their order instead, each from the pose before it, and nothing else
+    #[arg(long, conflicts_with_all = ["scans", "rooms", "drives", "seed", "no_viewpoints"], requires = "sets")]
+    sequences: bool,
 }
 
 /// Least share of points that agree, of each side, for a pose whose rays tell anything.
@@ -56,6 +60,9 @@ const EVIDENCE_MIN: f64 = 0.2;
 impl Verdicts {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
         let settings = AlignmentSettings::default();
+        if self.sequences {
+            return self.sequences(&settings, output);
+        }
         let mut sets = Vec::new();
         for set in &self.sets {
             let mut set = set.read(self.scans, output)?;
@@ -76,6 +83,19 @@ impl Verdicts {
             output.say(Agreement::HEAD)?;
         }
         agreements.iter().try_for_each(|agreement| output.print(agreement))
+    }
+
+    /// The scans of each set one after the other: those at whose true poses rays tell enough, and the others.
+    fn sequences(&self, settings: &AlignmentSettings, output: &Output) -> Result<(), CliError> {
+        output.say(Line::HEAD)?;
+        for set in &self.sets {
+            let set = set.read(usize::MAX, output)?;
+            let outcomes = set.in_order(settings, EVIDENCE_MIN)?;
+            let told = format!("{}, in order", set.name);
+            output.print(&Line::of(format!("{told}, evidence at the true pose"), outcomes.with_evidence))?;
+            output.print(&Line::of(format!("{told}, too little of it"), outcomes.without_evidence))?;
+        }
+        Ok(())
     }
 
     fn real(

@@ -9,6 +9,7 @@ mod aisles;
 mod outcomes;
 mod rooms;
 mod searches;
+mod sequences;
 mod sets;
 mod trial;
 
@@ -16,5 +17,6 @@ pub use aisles::{PERIODS_M, aisle};
 pub use outcomes::Outcomes;
 pub use rooms::{Carved, PEOPLE, PIECES, RoomTrials, STEP_S, TURN_S, rooms};
 pub use searches::{KindOfSearch, Searches};
+pub use sequences::SequenceOutcomes;
 pub use sets::{GUESSES, MapOf, Set, Trials};
 pub use trial::random;

@@ -57,8 +57,8 @@ pub struct Set {
     pub place: String,
     /// Which scans leave viewpoints in its maps.
     pub viewpoints: ViewpointSettings,
-    scans: Vec<(Vec<Point>, Pose)>,
-    resolution_m: f64,
+    pub(super) scans: Vec<(Vec<Point>, Pose)>,
+    pub(super) resolution_m: f64,
 }
 
 /// A map of some scans of a set, and the scans that are aligned to it.
