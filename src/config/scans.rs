@@ -2,7 +2,9 @@
 
 use crate::json::ByKeyword;
 use mrol_map::align::Method;
-use mrol_map::mapping::{CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings};
+use mrol_map::mapping::{
+    CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings, SENSOR_HEIGHT_MAX_M, SensorAxes, SensorMount,
+};
 use mrol_map::scan::PointFilter;
 use mrol_map::util::Keyword;
 use mrol_service::{RobotSettings, SettingKind, SettingValue, section};
@@ -31,6 +33,11 @@ section! {
         keep_zeros: bool = false; none;
         /// Points beyond `range_max_m` say nothing. Otherwise they tell that nothing was met up to there.
         beyond_range_is_noise: bool = false; none;
+        /// Which way its sensor's axes point: `robot` (x ahead, y left, z up) or `optical` (a camera's: x right, y down,
+        /// z ahead). Decides how the first scan of an empty map lies if no guess says.
+        axes: ByKeyword<SensorAxes> = ByKeyword::default(); none;
+        /// Height of its sensor above the floor. The first scan of an empty map is put there if no guess says.
+        sensor_height_m: f64 = 0.0; m, from -SENSOR_HEIGHT_MAX_M, to SENSOR_HEIGHT_MAX_M;
         /// Look for the robot where its scans are refused.
         recover: bool = false; none;
         /// Take out of the map what the robot's scans saw through.
@@ -65,6 +72,7 @@ impl RobotConfig {
             carve: self.carve,
             carving: self.carving(),
             odometry: self.odometry(),
+            mount: SensorMount { axes: self.axes.0, height_m: self.sensor_height_m },
         }
     }
 

@@ -9,6 +9,7 @@ use mrol_map::align::localize::SearchBox;
 use mrol_map::geometry;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{KeepOutName, MapName, Region, RequestId, RobotName, SessionName};
+use mrol_map::mapping::SENSOR_HEIGHT_MAX_M;
 use mrol_map::planning::{GridArea, Sphere};
 use mrol_map::util::Keyword;
 
@@ -22,6 +23,17 @@ pub fn keyword<T: Keyword>() -> impl TypedValueParser<Value = T> {
 pub fn pose(text: &str) -> Result<Pose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers(text, "x y z qx qy qz qw")?;
     geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|error| error.to_string())
+}
+
+/// Parses the height of a sensor above the floor, meters.
+pub fn sensor_height(text: &str) -> Result<f64, String> {
+    let [height_m] = numbers(text, "a number of meters")?;
+    match height_m.abs() <= SENSOR_HEIGHT_MAX_M {
+        true => Ok(height_m),
+        false => {
+            Err(format!("must be from -{SENSOR_HEIGHT_MAX_M} to {SENSOR_HEIGHT_MAX_M} m, got {height_m}"))
+        }
+    }
 }
 
 /// Parses a point "x,y,z", meters.

@@ -8,7 +8,7 @@ use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
 use mrol_map::mapping::{
     Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper,
-    Sightings,
+    SensorMount, Sightings,
 };
 use mrol_map::util::StopSignal;
 
@@ -75,6 +75,13 @@ impl Mapper {
     #[must_use]
     pub fn recovering(self, recovers: bool) -> Self {
         Self { recovers, ..self }
+    }
+
+    /// This mapper, for scans of a sensor that is mounted so.
+    #[must_use]
+    pub fn mounted(mut self, mount: SensorMount) -> Self {
+        self.settings.mount = mount;
+        self
     }
 
     /// The map so far.

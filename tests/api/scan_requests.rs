@@ -82,6 +82,28 @@ async fn points_out_of_range_or_of_the_robots_body_do_not_count() {
 }
 
 #[tokio::test]
+async fn the_first_scan_of_a_map_lies_as_its_robot_s_sensor_is_mounted_where_no_guess_says() {
+    let daemon = Daemon::start_with(|config| {
+        let camera: RobotConfig =
+            serde_json::from_value(json!({"axes": "optical", "sensor_height_m": 1.2})).unwrap();
+        config.robots.insert("camera".into(), camera);
+    })
+    .await;
+    let pose_of = async |robot: &str, map: &str, guess: &str| {
+        daemon.make_map(map).await;
+        let route = format!("/v1/maps/{map}/scans?robot={robot}{guess}");
+        let answer = json_of(daemon.post_bytes(&route, bytes_of(&corner())).await).await;
+        let pose = &answer["map_from_sensor"];
+        (pose["translation_m"].clone(), pose["rotation_xyzw"].clone())
+    };
+    let upright = (json!([0.0, 0.0, 1.2]), json!([-0.5, 0.5, -0.5, 0.5]));
+    assert_eq!(pose_of("camera", "a", "").await, upright);
+    let level = |z: f64| (json!([0.0, 0.0, z]), json!([0.0, 0.0, 0.0, 1.0]));
+    assert_eq!(pose_of("lidar", "b", "").await, level(0.0));
+    assert_eq!(pose_of("camera", "c", "&guess=0,0,3,0,0,0,1").await, level(3.0));
+}
+
+#[tokio::test]
 async fn directions_without_a_return_are_free_up_to_where_the_settings_say() {
     let daemon = Daemon::start_with(|config| {
         let nothing = RobotConfig { no_return_m: Some(12.0), ..RobotConfig::default() };

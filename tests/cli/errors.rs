@@ -48,6 +48,8 @@ fn numbers_out_of_range_are_usage_errors_that_name_the_range() {
         ("--min-overlap", "2", "overlap_min must lie in 0..=1"),
         ("--first-pose", "1 2 3", "7 numbers are needed"),
         ("--first-pose", "0 0 0 0 0 0 2", "norm 2"),
+        ("--sensor-height", "1001", "from -1000 to 1000 m, got 1001"),
+        ("--axes", "camera", "possible values: robot, optical"),
     ] {
         let mut arguments = vec!["map", &path, option, value];
         if option != "--resolution" {

@@ -3,6 +3,7 @@
 use mrol::geometry::pose_difference;
 use mrol::scan::read_trajectory;
 use mrol::store::{Disk, Snapshot};
+use serde_json::json;
 
 use super::{Sequence, complaint, mrol, objects};
 
@@ -52,6 +53,22 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
     }
     let snapshot = Snapshot::read(&Disk::default(), map.as_ref()).unwrap().contents;
     assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.len()), (added, SCANS));
+}
+
+#[test]
+fn the_first_scan_of_a_camera_is_put_upright_at_the_height_of_the_sensor() {
+    let sequence = Sequence::of(1);
+    let scans = sequence.path("scans");
+    let first_pose = |more: &[&str]| {
+        let lines = objects(&[&["map", &scans, "--resolution", "0.05"], more].concat());
+        let pose = &lines[0]["map_from_sensor"];
+        (pose["translation_m"].clone(), pose["rotation_xyzw"].clone())
+    };
+    assert_eq!(first_pose(&[]), (json!([0.0, 0.0, 0.0]), json!([0.0, 0.0, 0.0, 1.0])));
+    assert_eq!(
+        first_pose(&["--axes", "optical", "--sensor-height", "1.2"]),
+        (json!([0.0, 0.0, 1.2]), json!([-0.5, 0.5, -0.5, 0.5]))
+    );
 }
 
 #[test]

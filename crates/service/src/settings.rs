@@ -12,7 +12,7 @@ use super::resources::Gauges;
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::RobotName;
-use mrol_map::mapping::{CarvingSettings, OdometrySettings, StationarySettings};
+use mrol_map::mapping::{CarvingSettings, OdometrySettings, SensorMount, StationarySettings};
 use mrol_map::scan::PointFilter;
 use mrol_store::StoreSettings;
 
@@ -66,6 +66,8 @@ pub struct RobotSettings {
     pub carving: CarvingSettings,
     /// How far off its odometry is.
     pub odometry: OdometrySettings,
+    /// How its sensor is mounted.
+    pub mount: SensorMount,
 }
 
 /// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.

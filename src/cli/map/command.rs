@@ -20,6 +20,7 @@ use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
+use mrol_map::mapping::{SensorAxes, SensorMount};
 use mrol_map::scan::{
     Columns, PointFilter, SkippedPoints, StampedPose, read_exact_points_by, scan_files, write_trajectory,
 };
@@ -39,7 +40,7 @@ EXAMPLES:
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
 
-The first scan goes in at the origin (or --first-pose), each other one is aligned from the last accepted pose;
+The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is aligned from the last accepted pose;
 one that does not align is left out. With --truth line k of the file belongs to scan k, and errors are those of
 inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a last object \"summary\" is
 printed when --truth or --lookup is given.";
@@ -61,6 +62,14 @@ pub(crate) struct Map {
     /// Where the first scan was taken: "x y z qx qy qz qw" [default: the origin]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
     first_pose: Option<Pose>,
+    /// Which way the sensor's axes point: x ahead, y left, z up (robot), or a camera's, x right, y down, z ahead
+    /// (optical). The first scan is put upright in the map [default: robot]
+    #[arg(long, value_parser = parse::keyword::<SensorAxes>(), conflicts_with_all = ["first_pose", "at_truth"])]
+    axes: Option<SensorAxes>,
+    /// Height of the sensor above the floor: the first scan is put so high above the map's origin [default: 0]
+    #[arg(long, value_name = "METERS", allow_hyphen_values = true, value_parser = parse::sensor_height,
+          conflicts_with_all = ["first_pose", "at_truth"])]
+    sensor_height: Option<f64>,
     /// Write the poses of accepted scans as a TUM file, a line `k x y z qx qy qz qw` for scan k
     #[arg(long, value_name = "FILE")]
     trajectory_out: Option<PathBuf>,
@@ -130,7 +139,7 @@ impl Map {
         let (survey, origin) = self.survey(&files)?;
         let settings = MapSettings { origin, ..self.map_settings() };
         let mapper = Mapper::new(settings, alignment, self.guess.into())?;
-        let mut mapper = mapper.recovering(!self.no_recovery);
+        let mut mapper = mapper.recovering(!self.no_recovery).mounted(self.mount());
         if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
             output.note(format!("origin of the map: {x} {y} {z}"));
         }
@@ -163,6 +172,10 @@ impl Map {
         let has_poses = self.first_pose.is_some() || self.at_truth;
         let survey = Survey::of(&first, origin, has_poses, self.resolution);
         Ok((survey.with_columns(self.columns), origin))
+    }
+
+    fn mount(&self) -> SensorMount {
+        SensorMount { axes: self.axes.unwrap_or_default(), height_m: self.sensor_height.unwrap_or_default() }
     }
 
     fn map_settings(&self) -> MapSettings {

@@ -9,7 +9,7 @@ use crate::map::{MappedScan, RobotName, Trajectory};
 impl Guess {
     /// The pose that the guess stands for: map_from_sensor.
     ///
-    /// A robot without an accepted scan is at the origin of an empty map. The last accepted pose of a robot that stands
+    /// A robot without an accepted scan is at `first_pose`, which is none of a map that is not empty. The last accepted pose of a robot that stands
     /// still is where it was seen last, though that scan is not kept.
     ///
     /// # Errors
@@ -20,17 +20,16 @@ impl Guess {
         timestamp_ns: Option<i64>,
         trajectory: &Trajectory,
         sightings: &Sightings,
-        map_is_empty: bool,
+        first_pose: Option<Pose>,
     ) -> Result<Pose, MappingError> {
-        let last_or_origin = || match last_seen(robot, trajectory, sightings) {
+        let last_or_first = || match last_seen(robot, trajectory, sightings) {
             Some((map_from_sensor, _)) => Ok(map_from_sensor),
-            None if map_is_empty => Ok(Pose::identity()),
-            None => Err(MappingError::GuessRequired(robot.clone())),
+            None => first_pose.ok_or_else(|| MappingError::GuessRequired(robot.clone())),
         };
         match self {
             Self::Pose(map_from_sensor) => Ok(*map_from_sensor),
-            Self::Last => last_or_origin(),
-            Self::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
+            Self::Last => last_or_first(),
+            Self::Motion(last_from_sensor) => Ok(last_or_first()? * last_from_sensor),
             Self::ConstantVelocity => {
                 let last = trajectory.last_of(robot);
                 let standing = last.and_then(|last| Some((last, sightings.standing_since(last)?)));
@@ -42,7 +41,7 @@ impl Guess {
                     Some((last, before)) if !sightings.follows_refused(robot) => {
                         Ok(constant_velocity(stamped(before), stamped(last), timestamp_ns))
                     }
-                    _ => last_or_origin(),
+                    _ => last_or_first(),
                 }
             }
         }

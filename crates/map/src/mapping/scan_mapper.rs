@@ -11,6 +11,7 @@ use super::odometry::OdometrySettings;
 use super::recovery_settings::Recovery;
 use super::resolved_guess::last_seen;
 use super::scan::Scan;
+use super::sensor_mount::SensorMount;
 use super::sightings::Sightings;
 use super::stationary::StationarySettings;
 use super::viewpoints::{SeenScan, ViewpointSettings};
@@ -67,6 +68,8 @@ pub struct MappingSettings {
     pub viewpoints: ViewpointSettings,
     /// What a scan that fits carves out of the map; none: it only adds.
     pub carving: Option<CarvingSettings>,
+    /// How the sensor is mounted: where the first scan of an empty map was taken if nobody says.
+    pub mount: SensorMount,
 }
 
 impl<'a> ScanMapper<'a> {
@@ -90,6 +93,12 @@ impl<'a> ScanMapper<'a> {
         Self { settings: MappingSettings { carving, ..self.settings }, ..self }
     }
 
+    /// This mapper, for scans of a sensor that is mounted so.
+    #[must_use]
+    pub fn with_mount(self, mount: SensorMount) -> Self {
+        Self { settings: MappingSettings { mount, ..self.settings }, ..self }
+    }
+
     /// This mapper, for scans of a robot whose odometry errs so.
     #[must_use]
     pub fn with_odometry(self, odometry: OdometrySettings) -> Self {
@@ -109,8 +118,9 @@ impl<'a> ScanMapper<'a> {
         let Self { map, sightings, .. } = self;
         let start = Instant::now();
         let map_is_empty = map.is_empty();
+        let first_pose = map_is_empty.then(|| self.settings.mount.first_pose());
         let guess =
-            scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, first_pose)?;
         let mut velocity = self.velocity(scan, &guess);
         let mut alignment = if map_is_empty {
             let upright = if scan.at_guess { guess } else { self.prior(scan, guess).leveled_guess() };

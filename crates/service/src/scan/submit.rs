@@ -9,7 +9,7 @@ use crate::error::{Reason, ServiceError};
 use crate::maps::HostedMap;
 use crate::request::{Foreground, ScanAnswer, ScanRequest, bitmap, scan_id_too_old, scan_name};
 use crate::resources::{ResourceBudget, growth_bytes, removal_bytes};
-use crate::settings::ServiceSettings;
+use crate::settings::{RobotSettings, ServiceSettings};
 use crate::work::check_not_stopped;
 use mrol_map::align::Verdict;
 use mrol_map::geometry::{Point, Pose};
@@ -62,7 +62,8 @@ impl HostedMap {
         budget.check_to_grow()?;
         let recovers = settings.recovers(request);
         let mapper = self.mapper(request.method, recovers, settings).carving(settings.carving(request));
-        let mapper = mapper.with_odometry(settings.of_robot(&request.robot).odometry);
+        let RobotSettings { odometry, mount, .. } = settings.of_robot(&request.robot);
+        let mapper = mapper.with_odometry(odometry).with_mount(mount);
         let mapper = if effort == Effort::Whole { mapper } else { mapper.from_one_start() };
         let located = self.locate(&scan, &mapper, stop)?;
         let takes_long = located.alignment.wants_more_starts || recovers && !located.is_accepted();
@@ -132,8 +133,8 @@ impl HostedMap {
     ) -> Result<ScanAnswer, ServiceError> {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = FilteredScan::of(request, settings)?;
-        let odometry = settings.of_robot(&request.robot).odometry;
-        let mapper = self.mapper(request.method, false, settings).with_odometry(odometry);
+        let RobotSettings { odometry, mount, .. } = settings.of_robot(&request.robot);
+        let mapper = self.mapper(request.method, false, settings).with_odometry(odometry).with_mount(mount);
         let located = self.locate(&scan, &mapper, stop)?;
         let foreground = request.foreground_level.map(|level| self.foreground(&scan, &located, level));
         Ok(ScanAnswer { foreground, ..self.answer(&scan, &located) })

@@ -162,7 +162,7 @@ impl<'a> ScanMapper<'a> {
         motion: Option<&Pose>,
     ) -> Vec<OtherGuess> {
         let resolved = |guess: Guess| {
-            guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false).ok()
+            guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, None).ok()
         };
         // A scan that does not align to the one before it was taken near that all the same.
         let chained = before.map(|before| before.chained * motion.copied().unwrap_or_else(Pose::identity));
@@ -195,7 +195,7 @@ impl<'a> ScanMapper<'a> {
             return located.alignment.map_from_sensor;
         }
         let guess =
-            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false);
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, None);
         guess.unwrap_or(located.alignment.map_from_sensor)
     }
 
@@ -247,7 +247,7 @@ impl<'a> ScanMapper<'a> {
             .reachable(scan.robot, scan.timestamp_ns)
             .is_none_or(|reachable| reachable.contains(translation_m(pose)));
         let own =
-            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false);
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, None);
         let is_ruled_out = own.is_ok_and(|guess| {
             self.prior(scan, guess).rules_out(
                 pose,
