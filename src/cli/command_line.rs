@@ -6,7 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use super::{
     block, check, classify, completions, config, delete, doctor, events, frontiers, grid, health, insert,
-    keepout, key, lab, localize, map, maps, nearest, observers, query, rays, snapshot, undo, watch,
+    keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot, undo, watch,
 };
 use crate::demo::Demo;
 use mrol::build_info;
@@ -69,6 +69,7 @@ enum Command {
     Doctor(doctor::Doctor),
     Config(config::Settings),
     Completions(completions::Completions),
+    Man(man::Man),
     #[command(flatten)]
     Lab(lab::Lab),
 }
@@ -119,6 +120,7 @@ impl Command {
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
             Self::Completions(completions) => completions.run(CommandLine::command(), &output),
+            Self::Man(man) => man.run(CommandLine::command(), &output),
             Self::Lab(lab) => lab.run(),
         }
     }

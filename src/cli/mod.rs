@@ -23,6 +23,7 @@ mod keepout;
 mod key;
 mod lab;
 mod localize;
+mod man;
 mod map;
 mod maps;
 mod met;

@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 29] = [
+const COMMANDS: [&str; 30] = [
     "serve",
     "demo",
     "map",
@@ -32,6 +32,7 @@ const COMMANDS: [&str; 29] = [
     "config",
     "watch",
     "completions",
+    "man",
 ];
 
 #[test]
@@ -78,6 +79,17 @@ fn shells_complete_commands_and_options() {
         assert!(script.contains("snapshot") && script.contains("min-revision"), "{shell}: {script}");
     }
     mrol(&["completions", "cmd"]).assert().code(2);
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let pages = folder.path().join("man1");
+    mrol(&["man", pages.to_str().unwrap()]).assert().success();
+    let page = |name: &str| std::fs::read_to_string(pages.join(name)).unwrap();
+    assert!(page("mrol.1").contains("mrol\\-serve(1)"), "{}", page("mrol.1"));
+    assert!(page("mrol-map.1").contains("sensor\\-height"));
+    assert!(page("mrol-maps-create.1").contains(".TH"));
 }
 
 /// What bash itself completes with the script, where there is a bash.
