@@ -245,3 +245,18 @@ fn a_keep_out_is_put_asked_about_listed_and_removed() {
         .assert()
         .code(2);
 }
+
+#[test]
+fn an_undo_of_a_robot_that_the_map_does_not_know_names_those_that_it_knows() {
+    let sequence = Sequence::of(1);
+    let scans = sequence.path("scans");
+    let daemon = Daemon::start(&sequence.path("data"));
+    let create = ["--create", "--resolution", "0.1"];
+    daemon.call(&[&["insert", &scans, "--map", "a", "--robot", "r1"], &create[..]].concat());
+    let refused = daemon.refuses(&["undo", "--map", "a", "--robot", "r2", "--since", "0"]);
+    assert!(refused.contains("map a knows no robot r2: it has scans of r1"), "{refused}");
+    let undo = ["undo", "--map", "a", "--robot", "r1", "--since", "0"];
+    assert_eq!(daemon.call(&undo)[0]["scans"], 1);
+    // The robot stays known, and nothing is left to undo.
+    assert_eq!(daemon.call(&undo)[0]["scans"], 0);
+}

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use mrol::wire::pb;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
+use tonic::Code;
 
 use crate::support::daemon::{Daemon, PATIENCE, client, identity_json, json_of, row};
 
@@ -110,6 +111,18 @@ async fn a_scan_is_undone_and_what_others_saw_stays() {
     let missing = daemon.post("/v1/maps/a/undo", json!({"revision": bad})).await;
     assert_eq!(missing.status(), StatusCode::NOT_FOUND);
     assert_eq!(json_of(missing).await["reason"], "scan_not_found");
+    for unknown in [json!({"robot": "bda", "since_revision": 0}), json!({"robot": "bda", "scan_id": 1})] {
+        let refused = daemon.post("/v1/maps/a/undo", unknown).await;
+        assert_eq!(refused.status(), StatusCode::NOT_FOUND);
+        let refused = json_of(refused).await;
+        let message = refused["detail"].as_str().unwrap();
+        assert_eq!(refused["reason"], "robot_not_found");
+        assert!(message.contains("knows no robot bda: it has scans of bad, good"), "{message}");
+    }
+    let since = pb::RobotSince { robot: "bda".into(), revision: 0 };
+    let target = Some(pb::undo_request::Target::Since(since));
+    let undo = pb::UndoRequest { map: "a".into(), target, ..Default::default() };
+    assert_eq!(daemon.mapping().await.undo(undo).await.unwrap_err().code(), Code::NotFound);
 
     let since = pb::RobotSince { robot: "bad".into(), revision: 0 };
     let undo = pb::UndoRequest {

@@ -89,6 +89,24 @@ async fn scope_insert_undoes_scans_of_named_robots_and_deletes_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn who_may_only_insert_is_not_told_the_names_of_other_robots() {
+    let (server, [inserting, writing]) = Guarded::start_with(|keys| {
+        [("robots", Scope::Insert), ("tools", Scope::Write)].map(|(name, scope)| keys.add(name, scope, None))
+    })
+    .await;
+    server.make_map("own").await;
+    let scan = json!({"robot": "hidden", "points": POINTS, "guess": identity_json(), "align": false});
+    assert_eq!(http(&server, "scans", scan, &writing).await, None);
+    for (key, is_named) in [(&inserting, false), (&writing, true)] {
+        let undo = json!({"robot": "r9", "since_revision": 0});
+        let answer = server.http(Method::POST, "/v1/maps/own/undo", Some(key), Some(undo)).await;
+        let error: Value = answer.json().await.unwrap();
+        assert_eq!(error["reason"], "robot_not_found", "{error}");
+        assert_eq!(error.to_string().contains("hidden"), is_named, "{error}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn scope_insert_carves_nothing_because_a_scan_says_so() {
     let (server, [inserting, writing]) = Guarded::start_with(|keys| {
         [("robots", Scope::Insert), ("tools", Scope::Write)]

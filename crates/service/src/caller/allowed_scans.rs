@@ -27,6 +27,12 @@ impl Default for AllowedScans {
 }
 
 impl AllowedScans {
+    /// True of a caller that may know the names of all robots: one that is held to no robots, and may do more than
+    /// send scans.
+    pub(crate) fn may_know_all_robots(&self) -> bool {
+        self.robots.is_none() && self.undo_of_others
+    }
+
     /// Asks whether a scan of `robot` may be sent or undone.
     ///
     /// # Errors

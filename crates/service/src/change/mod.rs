@@ -6,4 +6,5 @@ mod digest;
 mod keep_out;
 mod keep_out_expiry;
 mod not_seen_since;
+mod robot_known;
 mod undo;

@@ -60,7 +60,7 @@ impl MapService {
     /// back.
     ///
     /// # Errors
-    /// `NotFound` without such a map, scan or revision; `FailedPrecondition` for a change from before what undo
+    /// `NotFound` without such a map, robot, scan or revision; `FailedPrecondition` for a change from before what undo
     /// reaches, for a revision that an undo made, or where maps are kept in memory only; `ResourceExhausted` while the
     /// disk is nearly full, where there is no memory to find out in what the map would be, or none for what comes back;
     /// `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
@@ -69,6 +69,7 @@ impl MapService {
             self.scans.permit_undo(&undo.target)?;
             let (map, undo) = (self.map(map).await?, Arc::new(undo));
             let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
+            let names_robots = self.scans.may_know_all_robots();
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             // Until its outcome is known: what was withdrawn before it is then what it found.
             let (lane, requester) = (&self.inner.lanes.undo, Requester::from(&self.asker));
@@ -78,7 +79,9 @@ impl MapService {
             let _robot = map.lock_robot_of(&undo.target).await;
             let of = Arc::clone(&map);
             self.submit_and_wait(("Undo", &of), (lane, &requester), Some(thread), move |stop| {
-                limit.run(stop, |stop| map.prepare_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
+                limit.run(stop, |stop| {
+                    map.prepare_undo(&undo, caller.as_ref(), names_robots, &inner.budget, &limit, stop)
+                })
             })
             .await
         };
@@ -105,11 +108,13 @@ impl HostedMap {
     /// Prepares an undo, unless it was done before.
     ///
     /// The owners of the voxels are read from the journal while scans go on coming in; the last of them are looked at
-    /// when nobody else can change the map.
+    /// when nobody else can change the map. An error for a robot that the map does not know names those that it knows
+    /// if `names_robots`.
     pub(crate) fn prepare_undo(
         self: &Arc<Self>,
         undo: &Undo,
         caller: Option<&CallerName>,
+        names_robots: bool,
         budget: &ResourceBudget,
         limit: &TimeLimit,
         stop: StopSignal<'_>,
@@ -128,6 +133,7 @@ impl HostedMap {
             let answer = UndoAnswer { scans, deletions, removed, restored, version, replayed: true };
             return Ok(Step::Answered(answer));
         }
+        self.check_robot_known(&undo.target, names_robots)?;
         budget.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_journal(UNDO))?;
         let withdrawn = self.map.trajectory().withdrawn().to_vec();

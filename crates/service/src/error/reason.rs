@@ -146,6 +146,7 @@ reasons! {
     NotFound {
         KeepOutNotFound "keep_out_not_found" Both: "the map has no keep-out of this name, or it has ended", "list them";
         MapNotFound "map_not_found" Both: "no such map, or it was deleted meanwhile", "make it; `GET /v1/maps` lists them";
+        RobotNotFound "robot_not_found" Both: "the map knows no robot of the name whose scans are to be undone", "correct the name; the message has those that it knows";
         RouteNotFound "route_not_found" Http: "no such path", "see [operations](#operations-over-http)";
         ScanNotFound "scan_not_found" Both: "no such accepted scan, or it was undone already; no such revision", "read the trajectory";
     }

@@ -246,7 +246,7 @@ async fn an_undo_gives_way_before_each_change_that_it_reads() {
     let (budget, turns) = (ResourceBudget::new(None, Marks::default()), Counted::default());
     let limit = TimeLimit::new("undo_time_max", 3600.0);
     let stop = StopSignal::NEVER.giving_way_by(&turns);
-    assert!(matches!(map.prepare_undo(&undo, None, &budget, &limit, stop), Ok(Step::Ready(..))));
+    assert!(matches!(map.prepare_undo(&undo, None, true, &budget, &limit, stop), Ok(Step::Ready(..))));
     // Those that are undone, and all since the snapshot before them.
     assert!(turns.0.get() >= 2 * SCANS, "{}", turns.0.get());
 }
