@@ -189,7 +189,7 @@ struct Made {
 impl Display for Made {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = if self.created { "created" } else { "was there already" };
-        write!(f, "{what}\n{}", self.map)
+        write!(f, "map {} {what}: {}", self.map.name(), self.map.kind())
     }
 }
 

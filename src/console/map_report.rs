@@ -30,6 +30,18 @@ impl MapReport {
             if info.is_asleep { "   asleep" } else { "" },
         )
     }
+
+    /// The map's name.
+    pub fn name(&self) -> &str {
+        &self.0.map
+    }
+
+    /// Voxels, levels and uuid of the map, in words.
+    pub fn kind(&self) -> String {
+        let JsonMap { settings, version, .. } = &self.0;
+        let (side, levels) = (settings.resolution_m, settings.levels);
+        format!("voxels of {side} m, {levels} levels, uuid {}", version.map_uuid)
+    }
 }
 
 impl From<&MapInfo> for MapReport {

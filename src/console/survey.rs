@@ -5,6 +5,8 @@ use std::path::Path;
 use nalgebra::{Point3, Translation3, Vector3};
 
 use super::error::CliError;
+use super::output::Output;
+use super::units::doubt_meters;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapOrigin;
 use mrol_map::scan::{Columns, PointFilter, read_exact_points_by};
@@ -82,6 +84,14 @@ impl Survey {
     #[must_use]
     pub fn with_columns(self, columns: Option<Columns>) -> Self {
         Self { columns, ..self }
+    }
+
+    /// Notes that the points of the first file do not seem to be in meters, if that is so.
+    pub fn note_unit(&self, file: &Path, first: &[Point3<f64>], output: &Output) {
+        // Points that are shifted are those of a survey, whose ranges say nothing.
+        if self.shift == Vector3::zeros() {
+            doubt_meters(&file.display().to_string(), first).into_iter().for_each(|doubt| output.note(doubt));
+        }
     }
 
     /// The points of a scan file near 0.

@@ -145,8 +145,79 @@ fn people_get_a_table() {
     let sequence = Sequence::of(2);
     let output = mrol(&["map", &sequence.path("scans"), "--resolution", "0.1"]).assert().success();
     let table = String::from_utf8(output.get_output().stdout.clone()).unwrap();
-    assert!(table.starts_with("scan ") && table.contains("0001.ply  accepted"), "{table}");
+    assert!(table.starts_with("2 scans, from 0000.ply to 0001.ply\nscan "), "{table}");
+    assert!(table.contains("0001.ply  accepted"), "{table}");
     assert!(table.contains("2 scans, 2 accepted, 0 refused"), "{table}");
+    assert!(table.ends_with("the map is not kept: --out FILE.mrol writes it\n"), "{table}");
+    assert!(!table.contains("filters:"), "{table}");
+}
+
+/// What a call prints for people, and what it says on standard error.
+fn texts(arguments: &[&str]) -> (String, String) {
+    let output = mrol(arguments).assert().success().get_output().clone();
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (stdout, stderr)
+}
+
+#[test]
+fn what_was_written_is_told_with_what_can_be_done_with_it() {
+    let sequence = Sequence::of(1);
+    let (scans, out, poses) = (sequence.path("scans"), sequence.path("a.mrol"), sequence.path("out.txt"));
+    let options = ["--resolution", "0.1", "--out", &out, "--trajectory-out", &poses, "--lookup", "bloom"];
+    let (table, _) = texts(&[&["map", &scans], &options[..]].concat());
+    let last = format!("poses written to {poses}; map written to {out}; `mrol restore {out}` puts it on a");
+    assert!(table.starts_with("1 scan: 0000.ply\n") && table.contains(&last), "{table}");
+    // The filters are told of where somebody asks for them.
+    assert!(table.contains("filters: "), "{table}");
+}
+
+#[test]
+fn files_that_a_pattern_of_the_shell_names_are_taken_as_given_and_that_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [ten, two] = ["scan10.xyz", "scan2.xyz"].map(path);
+    for file in [&ten, &two] {
+        std::fs::write(file, "1 0 0\n0 1 0\n0 0 1\n").unwrap();
+    }
+    let whole = path("");
+    let (table, said) = texts(&["map", &whole, "--resolution", "1"]);
+    assert!(
+        table.starts_with("2 scans, from scan2.xyz to scan10.xyz\n") && said.is_empty(),
+        "{table} {said}"
+    );
+    let (table, said) = texts(&["map", &ten, &two, "--resolution", "1"]);
+    assert!(table.starts_with("2 scans, from scan10.xyz to scan2.xyz\n"), "{table}");
+    assert!(said.contains("scan10.xyz before scan2.xyz; a folder is read in the natural order"), "{said}");
+}
+
+#[test]
+fn poses_put_scans_where_truth_with_at_truth_puts_them() {
+    let sequence = Sequence::of(2);
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let map = |options: &[&str]| {
+        let mut lines = objects(&[&["map", &scans, "--resolution", "0.05"], options].concat());
+        let places: Vec<_> = lines.drain(..2).map(|line| line["map_from_sensor"].clone()).collect();
+        places
+    };
+    assert_eq!(map(&["--poses", &truth]), map(&["--truth", &truth, "--at-truth"]));
+    complaint(&["map", &scans, "--resolution", "0.05", "--poses", &truth, "--truth", &truth], 2);
+}
+
+#[test]
+fn points_in_millimeters_are_told_with_their_range_and_span() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.xyz");
+    let on_wall = |k: u32| {
+        let angle = 0.05 * f64::from(k);
+        format!("{:.1} {:.1} {:.1}\n", 3000.0 * angle.cos(), 2500.0 * angle.sin(), f64::from(k % 9) * 250.0)
+    };
+    std::fs::write(&path, (0..120).map(on_wall).collect::<String>()).unwrap();
+    let (_, said) = texts(&["map", path.to_str().unwrap(), "--resolution", "0.05"]);
+    assert!(
+        said.contains("room.xyz: the median range of its points is 2") && said.contains("span 59"),
+        "{said}"
+    );
+    assert!(said.contains("are they in millimeters?"), "{said}");
 }
 
 #[test]

@@ -37,6 +37,10 @@ fn a_map_is_made_listed_described_and_deleted() {
     assert_eq!((&made["created"], &made["map"]), (&json!(true), &json!("a")));
     assert_eq!(made["settings"]["filter"]["hashes"], 3);
     assert_eq!(daemon.call(&create)[0]["created"], false);
+    let again = mrol(&[&create[..], &["--server", &daemon.0.grpc]].concat()).assert().success();
+    let line = String::from_utf8(again.get_output().stdout.clone()).unwrap();
+    assert!(line.starts_with("map a was there already: voxels of 0.05 m, 3 levels, uuid "), "{line}");
+    assert_eq!(line.lines().count(), 1, "{line}");
     assert!(daemon.refuses(&["maps", "create", "a", "--resolution", "0.1"]).contains("map_exists"));
     assert_eq!(daemon.call(&["maps", "list"])[0]["map_uuid"], made["map_uuid"]);
     assert_eq!(daemon.call(&["maps", "show", "a"])[0]["levels"].as_array().unwrap().len(), 3);

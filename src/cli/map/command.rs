@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::report::{ScanLine, Summary};
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
-use crate::cli::scan_report::name_of;
+use crate::cli::scan_report::{name_of, tell_order};
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
@@ -31,7 +31,7 @@ EXAMPLES:
   mrol map scans/ --resolution 0.05 --levels 5
   mrol map scans/ --resolution 0.1 --levels 6 --trajectory-out poses.txt --out hall.mrol
   mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
-  mrol map scans/ --resolution 0.1 --truth true.txt --at-truth --out hall.mrol
+  mrol map scans/ --resolution 0.1 --poses poses.txt --out hall.mrol      at known poses, without aligning
   mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
                                                              are the filters ample? (last line)
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
@@ -40,10 +40,11 @@ EXAMPLES:
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
 
-The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is aligned from the last accepted pose;
-one that does not align is left out. With --truth line k of the file belongs to scan k, and errors are those of
+The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is
+aligned from the last accepted pose; one that does not align is left out. With --truth line k of the file belongs to
+scan k, and errors are those of
 inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a last object \"summary\" is
-printed when --truth or --lookup is given.";
+printed when --truth, --poses or --lookup is given. Whether the filters are ample is said when --lookup is given.";
 
 /// Make a map of scans in this process, no server needed
 #[derive(Debug, clap::Args)]
@@ -64,11 +65,11 @@ pub(crate) struct Map {
     first_pose: Option<Pose>,
     /// Which way the sensor's axes point: x ahead, y left, z up (robot), or a camera's, x right, y down, z ahead
     /// (optical). The first scan is put upright in the map [default: robot]
-    #[arg(long, value_parser = parse::keyword::<SensorAxes>(), conflicts_with_all = ["first_pose", "at_truth"])]
+    #[arg(long, value_parser = parse::keyword::<SensorAxes>(), conflicts_with_all = ["first_pose", "at_truth", "poses"])]
     axes: Option<SensorAxes>,
     /// Height of the sensor above the floor: the first scan is put so high above the map's origin [default: 0]
     #[arg(long, value_name = "METERS", allow_hyphen_values = true, value_parser = parse::sensor_height,
-          conflicts_with_all = ["first_pose", "at_truth"])]
+          conflicts_with_all = ["first_pose", "at_truth", "poses"])]
     sensor_height: Option<f64>,
     /// Write the poses of accepted scans as a TUM file, a line `k x y z qx qy qz qw` for scan k
     #[arg(long, value_name = "FILE")]
@@ -82,6 +83,10 @@ pub(crate) struct Map {
     /// Put the scans at their true poses, without aligning
     #[arg(long, requires = "truth", conflicts_with = "first_pose")]
     at_truth: bool,
+    /// Put every scan at its pose in this TUM file, without aligning: the same as --truth FILE --at-truth, and as
+    /// --poses of `mrol insert`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["truth", "first_pose"])]
+    poses: Option<PathBuf>,
     /// Share of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say [default:
     /// 0]
     #[arg(long, value_name = "SHARE")]
@@ -133,10 +138,11 @@ impl Map {
         let filter = self.points.filter().map_err(CliError::usage)?;
         let filter = PointFilter { keep_zeros: self.keep_zeros, ..filter };
         let files = scan_files(&self.scans)?;
-        let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
+        let truth = self.poses_file().map(|path| true_poses(path, files.len(), &output)).transpose()?;
         self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
 
-        let (survey, origin) = self.survey(&files)?;
+        tell_order(&files, &output)?;
+        let (survey, origin) = self.survey(&files, &output)?;
         let settings = MapSettings { origin, ..self.map_settings() };
         let mapper = Mapper::new(settings, alignment, self.guess.into())?;
         let mut mapper = mapper.recovering(!self.no_recovery).mounted(self.mount());
@@ -154,28 +160,52 @@ impl Map {
         }
         output.clear_bar();
         self.write_results(&mapper, &run)?;
-        let summary = run.summary(&mapper);
         // Programs get only the scans, unless they ask for what is in the summary.
-        match output.is_json() && self.truth.is_none() && self.lookup.is_none() {
-            true => Ok(()),
-            false => output.print(&summary),
+        if !output.is_json() || self.poses_file().is_some() || self.lookup.is_some() {
+            output.print(&run.summary(&mapper, self.lookup))?;
         }
+        output.say(self.what_next())
     }
 
     /// How the scans lie to the map, and the map's origin, if it is to have one.
-    fn survey(&self, files: &[PathBuf]) -> Result<(Survey, Option<MapOrigin>), CliError> {
+    fn survey(&self, files: &[PathBuf], output: &Output) -> Result<(Survey, Option<MapOrigin>), CliError> {
         let Some(file) = files.first() else {
             return Ok((Survey::of(&[], None, false, self.resolution), None));
         };
         let first = read_exact_points_by(file, self.columns)?;
         let origin = self.origin.map(|choice| choice.origin(file, &first)).transpose()?;
-        let has_poses = self.first_pose.is_some() || self.at_truth;
+        let has_poses = self.first_pose.is_some() || self.at_poses();
         let survey = Survey::of(&first, origin, has_poses, self.resolution);
+        survey.note_unit(file, &first, output);
         Ok((survey.with_columns(self.columns), origin))
     }
 
     fn mount(&self) -> SensorMount {
         SensorMount { axes: self.axes.unwrap_or_default(), height_m: self.sensor_height.unwrap_or_default() }
+    }
+
+    /// The file of poses, whatever they are for.
+    fn poses_file(&self) -> Option<&PathBuf> {
+        self.truth.as_ref().or(self.poses.as_ref())
+    }
+
+    /// True where scans are put at the poses of a file.
+    fn at_poses(&self) -> bool {
+        self.at_truth || self.poses.is_some()
+    }
+
+    /// What was written, and what can be done with it.
+    fn what_next(&self) -> String {
+        let trajectory =
+            self.trajectory_out.as_ref().map(|path| format!("poses written to {}", path.display()));
+        let map = match &self.out {
+            Some(path) => {
+                let path = path.display();
+                format!("map written to {path}; `mrol restore {path}` puts it on a running server")
+            }
+            None => "the map is not kept: --out FILE.mrol writes it".to_owned(),
+        };
+        trajectory.into_iter().chain([map]).collect::<Vec<_>>().join("; ")
     }
 
     fn map_settings(&self) -> MapSettings {
@@ -229,7 +259,7 @@ impl Run {
         Self {
             survey,
             first_pose: options.first_pose.map(to_map),
-            at_truth: options.at_truth,
+            at_truth: options.at_poses(),
             truth: truth.map(TruthErrors::new),
             trajectory: Vec::new(),
             scans: 0,
@@ -264,7 +294,8 @@ impl Run {
         ScanLine::of(name_of(file), mapped, &skipped, error, self.name_width)
     }
 
-    fn summary(&self, mapper: &Mapper) -> Summary {
+    /// The summary of the run; that of the filters where somebody asked them by name.
+    fn summary(&self, mapper: &Mapper, asked: Option<Lookup>) -> Summary {
         Summary {
             scans: self.scans,
             accepted: self.trajectory.len(),
@@ -274,7 +305,8 @@ impl Run {
             levels: mapper.map().settings().levels,
             seconds: self.start.elapsed().as_secs_f64(),
             error: self.truth.as_ref().and_then(TruthErrors::summary),
-            filter: mapper.asks_filters().then(|| self.false_positives.summary(mapper.false_positive_rate())),
+            filter: (asked.is_some() && mapper.asks_filters())
+                .then(|| self.false_positives.summary(mapper.false_positive_rate())),
         }
     }
 }

@@ -11,7 +11,9 @@ mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
 pub use reader::{Columns, ColumnsError, ReadError};
-pub use reader::{parse_points, read_exact_points, read_exact_points_by, read_points, scan_files};
+pub use reader::{
+    compare_names, parse_points, read_exact_points, read_exact_points_by, read_points, scan_files,
+};
 pub use skipped::SkippedPoints;
 pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
 pub use writer::{write_f32, write_ply};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Compares the names of two files; runs of digits count as the numbers that they are. Of names that are equal so, as
 /// scan2 and scan02, the order of the bytes decides.
-pub(super) fn compare_names(a: &Path, b: &Path) -> Ordering {
+pub fn compare_names(a: &Path, b: &Path) -> Ordering {
     let [a_name, b_name] = [a, b].map(|path| path.file_name().unwrap_or_default().as_encoded_bytes());
     compare(a_name, b_name).then_with(|| a.cmp(b))
 }
