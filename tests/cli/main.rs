@@ -1,6 +1,7 @@
 //! The command line as a process: what it prints, which files it writes, and its exit codes.
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+mod broken_connections;
 mod demo;
 mod doctor;
 mod errors;
