@@ -1,19 +1,23 @@
 //! Errors of the settings.
 
-use std::path::PathBuf;
-
 use mrol_map::mapping::{CarvingSettingsError, OdometrySettingsError};
 use mrol_map::scan::PointFilterError;
+use std::path::PathBuf;
 
 /// Why the settings are not valid.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// An unknown setting or a value of the wrong type; the message names both and their source.
     #[error("{0}")]
-    Value(Box<figment::Error>),
-    /// The settings file that the command line names does not exist.
-    #[error("configuration file {} cannot be read", .0.display())]
-    File(PathBuf),
+    Value(String),
+    /// The settings file that the command line names cannot be read.
+    #[error("configuration file {} cannot be read: {problem}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why, in the system's words.
+        problem: String,
+    },
     /// A setting that was renamed since an earlier version.
     #[error("{old} is called {new} now")]
     Renamed {

@@ -1,5 +1,6 @@
 //! Settings are loaded from defaults, a file, variables and options.
 
+use std::fs::{self, File};
 use std::path::Path;
 
 use figment::Figment;
@@ -7,6 +8,7 @@ use figment::providers::{Env, Format, Serialized, Toml};
 use serde::Serialize;
 
 use super::error::ConfigError;
+use super::refused_value::described;
 use super::settings::Config;
 use super::variables;
 
@@ -25,22 +27,32 @@ impl Config {
         variables::check(variables::of_environment())?;
         let mut figment = Figment::from(Serialized::defaults(Self::default()));
         if let Some(file) = file {
-            if !file.is_file() {
-                return Err(ConfigError::File(file.to_owned()));
-            }
+            check_file(file)?;
             figment = figment.merge(Toml::file_exact(file));
         }
-        let overrides = serde_json::to_value(overrides)
-            .map_err(|error| ConfigError::Value(Box::new(error.to_string().into())))?;
+        let overrides =
+            serde_json::to_value(overrides).map_err(|error| ConfigError::Value(error.to_string()))?;
         let given = Serialized::globals(without_nulls(overrides));
         let figment = figment.merge(settings_of_environment()).merge(given);
         if let Some((old, new)) = RENAMED.into_iter().find(|(old, _)| figment.contains(old)) {
             return Err(ConfigError::Renamed { old, new });
         }
-        let config: Self = figment.extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
+        let config: Self = figment.extract().map_err(|e| ConfigError::Value(described(&e)))?;
         let (limits, constants) = config.limits.clone().with_constants();
         Self { limits, constants_set: constants, ..config }.checked()
     }
+}
+
+/// Sees that the settings file is a file that this process may read.
+fn check_file(path: &Path) -> Result<(), ConfigError> {
+    let unreadable = |problem: String| ConfigError::File { path: path.to_owned(), problem };
+    // A pipe would be opened for ever.
+    match fs::metadata(path) {
+        Ok(metadata) if metadata.is_file() => File::open(path).map(drop),
+        Ok(_) => return Err(unreadable("it is no file".to_owned())),
+        Err(error) => Err(error),
+    }
+    .map_err(|error| unreadable(error.to_string()))
 }
 
 /// Renamed settings: former name, present name.
@@ -156,7 +168,11 @@ mod tests {
         );
         assert!(error("[log]\nformat = \"xml\"").contains("xml"));
         let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
-        assert!(missing.to_string().contains("no-such-file.toml"));
+        let missing = missing.to_string();
+        assert!(missing.contains("no-such-file.toml") && missing.contains("No such file"), "{missing}");
+        let folder = tempfile::tempdir().unwrap();
+        let folder = Config::load(Some(folder.path()), json!({})).unwrap_err().to_string();
+        assert!(folder.ends_with("it is no file"), "{folder}");
     }
 
     #[test]

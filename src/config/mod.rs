@@ -10,6 +10,7 @@ mod listener;
 mod loading;
 mod log;
 mod maps;
+mod refused_value;
 mod scans;
 mod settings;
 mod store;

@@ -118,6 +118,21 @@ fn a_call_that_makes_no_sense_is_a_usage_error() {
 }
 
 #[test]
+fn a_settings_file_that_cannot_be_read_and_a_wrong_value_are_told_by_path_and_key() {
+    let serve = |arguments: &[&str]| complaint(&[&["serve"], arguments].concat(), 2);
+    let missing = serve(&["--config", "nofile.toml"]);
+    assert!(missing.contains("nofile.toml cannot be read: No such file"), "{missing}");
+    let (_folder, path) = file("mrol.toml", b"[limits]\nmaps_max = -1\n");
+    let wrong = serve(&["--config", &path]);
+    assert!(wrong.contains("limits.maps_max in ") && wrong.contains("mrol.toml: must be"), "{wrong}");
+    let option = serve(&["--durability", "often"]);
+    assert!(option.starts_with("error: store.durability: must be"), "{option}");
+    let variable = mrol(&["serve"]).env("MROL_HTTP__LISTEN", "5").assert().code(2).get_output().clone();
+    let variable = String::from_utf8(variable.stderr).unwrap();
+    assert!(variable.starts_with("error: MROL_HTTP__LISTEN: must be an address"), "{variable}");
+}
+
+#[test]
 fn an_address_that_is_taken_is_named_with_what_to_do() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();

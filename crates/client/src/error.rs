@@ -10,6 +10,16 @@ use mrol_service::ServiceError;
 /// Start of the TLS error for a server's certificate.
 const BAD_CERTIFICATE: &str = "invalid peer certificate";
 
+/// Part of the TLS error for a peer that answers without TLS.
+const NO_TLS: &str = "InvalidContentType";
+
+/// Part of the error for an answer whose first byte is that of a text.
+const NO_GRPC: &str = "invalid compression flag";
+
+/// What is said of such an answer.
+const PLAIN_HTTP: &str = "it answered as an HTTP server does, and the HTTP port of `mrol serve` is another (7333) than \
+                          that of gRPC (7334)";
+
 /// A call that failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClientError {
@@ -83,6 +93,11 @@ impl ClientError {
     pub(super) fn unreachable(url: String, error: &dyn Error) -> Self {
         match root_cause(error) {
             cause if cause.starts_with(BAD_CERTIFICATE) => Self::Untrusted { url, cause },
+            cause if cause.contains(NO_TLS) => {
+                let cause = "what answers there speaks no TLS: https:// is for servers with a certificate, \
+                             http:// for others";
+                Self::Unreachable { url, cause: cause.to_owned() }
+            }
             cause => Self::Unreachable { url, cause },
         }
     }
@@ -99,7 +114,8 @@ impl ClientError {
         };
         match (reason, status.code()) {
             (None, Code::Internal | Code::Unknown | Code::Unimplemented) => {
-                Self::Foreign { url: url.to_owned(), cause: message.to_owned() }
+                let cause = if message.contains(NO_GRPC) { PLAIN_HTTP } else { message };
+                Self::Foreign { url: url.to_owned(), cause: cause.to_owned() }
             }
             (reason, code) => {
                 Self::Refused { code, reason: reason.map(str::to_owned), message: message.to_owned() }
@@ -145,6 +161,17 @@ mod tests {
     fn an_answer_that_is_none_of_ours_is_told_as_such() {
         let error = ClientError::of("http://a", &Status::unimplemented("")).to_string();
         assert!(error.starts_with("http://a does not answer as mrol's gRPC does"), "{error}");
+    }
+
+    #[test]
+    fn an_http_port_and_a_port_without_tls_are_told_in_plain_words() {
+        let flag =
+            "protocol error: received message with invalid compression flag: 123 (valid flags are 0 and 1)";
+        let error = ClientError::of("http://a", &Status::internal(flag)).to_string();
+        assert!(error.contains("HTTP port of `mrol serve`") && !error.contains("flag"), "{error}");
+        let corrupt = std::io::Error::other("received corrupt message of type InvalidContentType");
+        let error = ClientError::unreachable("https://a".into(), &corrupt).to_string();
+        assert!(error.contains("speaks no TLS") && !error.contains("corrupt"), "{error}");
     }
 
     #[test]
