@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use super::{
-    block, check, classify, completions, config, delete, doctor, events, frontiers, grid, health, insert,
-    keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot, undo, watch,
+    block, check, classify, completions, config, delete, doctor, events, export, frontiers, grid, health,
+    insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot, undo,
+    watch,
 };
 use crate::demo::Demo;
 use mrol::build_info;
@@ -66,6 +67,7 @@ enum Command {
     Key(key::Keys),
     Snapshot(snapshot::TakeSnapshots),
     Restore(snapshot::Restore),
+    Export(export::Export),
     Doctor(doctor::Doctor),
     Config(config::Settings),
     Completions(completions::Completions),
@@ -117,6 +119,7 @@ impl Command {
             Self::Key(key) => key.run(&output),
             Self::Snapshot(snapshot) => runtime::block_on(snapshot.run(output)),
             Self::Restore(restore) => runtime::block_on(restore.run(output)),
+            Self::Export(export) => runtime::block_on(export.run(output)),
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
             Self::Completions(completions) => completions.run(CommandLine::command(), &output),

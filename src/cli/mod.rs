@@ -15,6 +15,7 @@ mod config;
 mod delete;
 mod doctor;
 mod events;
+mod export;
 mod frontiers;
 mod grid;
 mod health;

@@ -251,6 +251,38 @@ fn a_keep_out_is_put_asked_about_listed_and_removed() {
 }
 
 #[test]
+fn a_map_is_exported_as_points_that_are_read_back_the_same_from_a_file_and_a_server() {
+    let sequence = Sequence::of(1);
+    let path = |name: &str| sequence.path(name);
+    let (scans, map) = (path("scans"), path("a.mrol"));
+    objects(&["map", &scans, "--resolution", "0.1", "--out", &map]);
+    let daemon = Daemon::start("");
+    daemon.call(&["restore", &map]);
+    let settings = mrol::store::Snapshot::read(&mrol::store::Disk::default(), map.as_ref()).unwrap();
+    for level in [0_u32, 2] {
+        let level_text = level.to_string();
+        let side = 0.1 * f64::from(1 << level);
+        let expected: std::collections::BTreeSet<_> =
+            settings.contents.voxels.iter().map(|key| key.ancestor(level).index()).collect();
+        for out in [path("a.ply"), path("a.pcd")] {
+            let told = &objects(&["export", &map, "--level", &level_text, "--out", &out])[0];
+            assert_eq!(told["points"], expected.len());
+            let bytes = std::fs::read(&out).unwrap();
+            let points = mrol::scan::read_points(out.as_ref()).unwrap();
+            let index = |c: f64| (c / side).floor() as i32;
+            let found: std::collections::BTreeSet<[i32; 3]> =
+                points.iter().map(|point| point.to_f64().coords.map(index).into()).collect();
+            assert!(points.len() == expected.len() && found == expected, "level {level} of {out}");
+            daemon.call(&["export", "--map", "a", "--level", &level_text, "--out", &out]);
+            assert!(std::fs::read(&out).unwrap() == bytes, "level {level} of {out}");
+        }
+    }
+    let refused = |level: &str, out: &str| complaint(&["export", &map, "--level", level, "--out", out], 2);
+    assert!(refused("6", &path("b.ply")).contains("--level must be 0 to 5, got 6"));
+    assert!(refused("0", &path("b.obj")).contains("--out must end in .ply or .pcd"));
+}
+
+#[test]
 fn an_undo_of_a_robot_that_the_map_does_not_know_names_those_that_it_knows() {
     let sequence = Sequence::of(1);
     let scans = sequence.path("scans");

@@ -42,9 +42,9 @@ EXAMPLES:
 
 The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is
 aligned from the last accepted pose; one that does not align is left out. With --truth line k of the file belongs to
-scan k, and errors are those of
-inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a last object \"summary\" is
-printed when --truth, --poses or --lookup is given. Whether the filters are ample is said when --lookup is given.";
+scan k, and errors are those of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a
+last object \"summary\" is printed when --truth, --poses or --lookup is given. Whether the filters are ample is said
+when --lookup is given.";
 
 /// Make a map of scans in this process, no server needed
 #[derive(Debug, clap::Args)]

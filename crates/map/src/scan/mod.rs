@@ -16,4 +16,4 @@ pub use reader::{
 };
 pub use skipped::SkippedPoints;
 pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
-pub use writer::{write_f32, write_ply};
+pub use writer::{write_f32, write_pcd, write_ply};
