@@ -93,6 +93,7 @@ class NativeMap:
         area: _Fields | None,
         min_z_m: float | None,
         max_z_m: float | None,
+        band_from: str,
         cell_m: float | None,
         tell_unknown: bool,
     ) -> _Fields: ...

@@ -160,7 +160,7 @@ def _draw_voxels(axes: Axes, rendering: Rendering, paths: tuple[Places, Places])
 
 def _draw_grid(axes: Axes, served: ServedMap, box: tuple[Places, Places], paths: tuple[Places, Places]) -> None:
     heights = paths[1][:, 2]
-    band = {"min_z_m": float(heights.min()), "max_z_m": float(heights.max())}
+    band = {"min_z_m": float(heights.min()), "max_z_m": float(heights.max()), "band_from": "map"}
     area = {"min_m": box[0][:2].tolist(), "max_m": box[1][:2].tolist()}
     head, raw = served.ask("grid", {"area": area} | band)
     columns, rows = head["size"]

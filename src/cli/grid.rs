@@ -13,20 +13,27 @@ use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::count;
 use mrol::console::parse;
-use mrol_map::planning::{Grid, GridArea};
+use mrol_map::planning::{BandFrom, Grid, GridArea};
 use mrol_service::{GridQuestion, GridScope};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
-  mrol grid --map office --band \"0.1 1.8\" --out office.pgm        what a robot of 1.8 m can run into
+  mrol grid --map office --band \"0.1 1.8\" --out office.pgm        what a robot of 1.8 m on the floor can run into
   mrol grid --map office --band \"0.1 1.8\" --cell 0.1 --area \"0 0 10 8\" --out office.pgm
   mrol grid --map office --out office.pgm --unknown               free is only what scans saw through
+  mrol grid --map office --band \"-1.6 0\" --band-from map --out office.pgm
+
+The band counts from the floor: in each column of voxels from the top of those that the floor lies in. It is found below the poses
+of the robots and followed from there, up and down ramps. What it does not reach, as the cells of a wall, has the floor of a cell
+near it. What lies below it, such as stairs that lead down, is not drawn.
 
 Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read. The
 server draws large grids in tiles; if the map changes meanwhile, each tile is of a revision of its own.";
 
 /// What names of descriptions end in.
 const DESCRIPTION: &str = "yaml";
+/// What names of images end in.
+const IMAGE: &str = "pgm";
 
 /// Draw a map from above, as a 2-D grid for Nav2
 #[derive(Debug, clap::Args)]
@@ -34,12 +41,15 @@ const DESCRIPTION: &str = "yaml";
 pub(super) struct DrawGrid {
     #[command(flatten)]
     map: MapOptions,
-    /// Where to write the image; the description gets the same name with .yaml
+    /// Where to write the image, a PGM; the description gets the same name with .yaml
     #[arg(long, value_name = "FILE.pgm")]
     out: PathBuf,
     /// Lowest and highest height in meters: voxels count that reach between [default: all]
     #[arg(long, value_name = "Z Z", allow_hyphen_values = true, value_parser = parse::band)]
     band: Option<[f64; 2]>,
+    /// What the band counts from: floor, or map for z = 0 of the map, where usually the first sensor was
+    #[arg(long, value_name = "FROM", default_value = "floor", value_parser = parse::keyword::<BandFrom>())]
+    band_from: BandFrom,
     /// The rectangle to draw: smallest and largest x y, meters [default: all that there is]
     #[arg(long, value_name = "X Y X Y", allow_hyphen_values = true, value_parser = parse::rectangle)]
     area: Option<GridArea>,
@@ -55,12 +65,13 @@ pub(super) struct DrawGrid {
 
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, out, band, area, cell, unknown, asked } = self;
+        let Self { map, out, band, band_from, area, cell, unknown, asked } = self;
         check_is_image(&out)?;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope {
             area: area.unwrap_or(GridArea::Occupied),
             band_m,
+            band_from,
             cell_m: cell,
             tells_unknown: unknown,
         };
@@ -77,15 +88,17 @@ impl DrawGrid {
     }
 }
 
-/// Refuses an image that its own description would replace.
+/// Refuses an image of another format: `map_server` reads it by its name.
 fn check_is_image(out: &Path) -> Result<(), CliError> {
-    match out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(DESCRIPTION)) {
-        true => Err(CliError::usage(format!(
-            "--out {} is the name of the description, which is written beside the image: name the image, as in {}",
+    match out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(IMAGE)) {
+        true => Ok(()),
+        false => Err(CliError::usage(format!(
+            "--out {}: the image is a PGM, which map servers and image viewers read: name it {}; its description is written \
+             beside it, as {}",
             out.display(),
-            out.with_extension("pgm").display()
+            out.with_extension(IMAGE).display(),
+            out.with_extension(DESCRIPTION).display()
         ))),
-        false => Ok(()),
     }
 }
 
@@ -112,6 +125,9 @@ struct Drawn {
     cells_occupied: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     cells_free: Option<usize>,
+    /// The lowest and the highest floor, in the map frame, where the band counts from it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    floor_m: Option<[f64; 2]>,
     /// Of the first tile.
     revision_first: u64,
     /// Of the last tile.
@@ -128,6 +144,7 @@ impl Drawn {
             origin_m: grid.origin_m,
             cells_occupied: ones(&grid.occupied),
             cells_free: grid.free.as_deref().map(ones),
+            floor_m: grid.floor_m,
             revision_first,
             revision,
         }
@@ -145,6 +162,9 @@ impl Display for Drawn {
         match self.cells_free {
             Some(free) => write!(f, "{occupied} of them occupied and {} free", count(free))?,
             None => write!(f, "{occupied} of them occupied")?,
+        }
+        if let Some([low_m, high_m]) = self.floor_m {
+            write!(f, ", floor from {low_m:.2} to {high_m:.2} m of the map")?;
         }
         match self.revision_first == self.revision {
             true => write!(f, ", at revision {}", self.revision),

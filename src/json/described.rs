@@ -65,6 +65,7 @@ names! {
 }
 
 words! {
+    BandFrom: planning::BandFrom, "What the heights of a band count from.";
     Lookup: map::Lookup, "A way to look up.";
     MeasuredTo: planning::MeasuredTo, "What a distance is measured to.";
     Method: align::Method, "A method of alignment.";

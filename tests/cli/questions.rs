@@ -105,13 +105,25 @@ fn what_nobody_saw_is_told_from_what_is_there() {
 }
 
 #[test]
-fn a_grid_is_not_written_over_by_its_own_description() {
+fn a_grid_of_another_format_than_pgm_and_one_that_its_own_description_replaces_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["x.yaml", "x.YAML"] {
+    for name in ["x.yaml", "x.YAML", "x.png", "x"] {
         let out = folder.path().join(name);
         let told = complaint(&["grid", "--map", "a", "--out", out.to_str().unwrap()], 2);
         assert!(told.contains("x.pgm") && !out.exists(), "{told}");
     }
+}
+
+#[test]
+fn a_grid_counts_from_the_floor_or_says_what_to_give() {
+    let building = Building::open();
+    let folder = tempfile::tempdir().unwrap();
+    let image = folder.path().join("a.pgm");
+    let grid = ["grid", "--out", image.to_str().unwrap(), "--band", "-1 1"];
+    let told = complaint(&[&grid[..], &["--map", "a", "--server", &building.daemon.grpc]].concat(), 1);
+    assert!(told.contains("floor") && told.contains("band_from map"), "{told}");
+    let drawn = &building.ask(&[&grid[..], &["--band-from", "map"]].concat())[0];
+    assert!(number(drawn, "cells_occupied") > 10.0 && drawn["floor_m"].is_null(), "{drawn}");
 }
 
 #[test]

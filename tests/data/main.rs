@@ -5,6 +5,7 @@
 mod alignment;
 mod bare_floats;
 mod filter_identity;
+mod floor;
 mod localization;
 mod maps;
 #[path = "../support/mod.rs"]

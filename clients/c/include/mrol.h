@@ -521,6 +521,15 @@ typedef struct mrol_frontier_answers {
     mrol_frontier *frontiers;
 } mrol_frontier_answers;
 
+/* What the heights of a grid's band count from. */
+enum {
+    /* The floor that robots stand on, in each column of voxels: found below the viewpoints of the map. A replica has them unless
+     * its options say otherwise; one of a region cannot tell the floor. Without bounds it does not matter. */
+    MROL_BAND_FROM_FLOOR = 0,
+    /* z = 0 of the map, where usually the first scan's sensor was. */
+    MROL_BAND_FROM_MAP = 1
+};
+
 /* A question: what is the map, seen from above? Take it from mrol_grid_question_default(). */
 typedef struct mrol_grid_question {
     size_t struct_size;
@@ -529,8 +538,8 @@ typedef struct mrol_grid_question {
      * side, and every cell that the area meets belongs to the grid. */
     double area_min_m[2];
     double area_max_m[2];
-    /* Voxels count that reach between these heights, by more than a border, where has_min_z and has_max_z are 1; where both
-     * lie in one voxel, that one. */
+    /* Voxels count that reach between these heights above what band_from says, by more than a border, where has_min_z and
+     * has_max_z are 1; where both lie in one voxel, that one. */
     double min_z_m;
     double max_z_m;
     /* Side of a cell: a whole number of the level's voxels. 0: one voxel. */
@@ -540,8 +549,10 @@ typedef struct mrol_grid_question {
     uint8_t has_max_z;
     /* 1: tell free cells from unknown ones. Takes more time. */
     uint8_t tell_unknown;
+    /* MROL_BAND_FROM_FLOOR or MROL_BAND_FROM_MAP. */
+    uint8_t band_from;
     /* Not used: zero. */
-    uint8_t reserved[4];
+    uint8_t reserved[3];
 } mrol_grid_question;
 
 /* How large a grid is: cell (x, y) has the number y * cells[0] + x. */
@@ -551,8 +562,10 @@ typedef struct mrol_grid_shape {
     double origin_m[2];
     /* Cells along x and y. */
     uint64_t cells[2];
-    /* Not used: zero. */
-    uint64_t reserved[2];
+    /* The lowest and the highest floor of these cells, in the map frame; NaN where the band does not count from the floor, or it
+     * reaches none of them. */
+    double floor_min_m;
+    double floor_max_m;
 } mrol_grid_shape;
 
 /* Where a grid goes. Take it from mrol_grid_answers_default(), and set shape. */
@@ -564,7 +577,7 @@ typedef struct mrol_grid_answers {
     mrol_grid_shape *shape;
     /* A bit a cell: it has a voxel in the band, or a point of a keep-out; NULL: not wanted. */
     uint8_t *occupied;
-    /* Height of the top of each cell's highest voxel in the band, NaN of a cell without one, for keep-outs have none;
+    /* Height in the map frame of the top of each cell's highest voxel in the band, NaN of a cell without one, for keep-outs have none;
      * NULL: not wanted. */
     float *tops_m;
     /* A bit a cell: it is not occupied, and each of its columns of voxels has a free one in the band. What is neither occupied nor

@@ -297,8 +297,8 @@ mod tests {
             "mrol_frontier_question" FrontierQuestion { struct_size scope min_m max_m standoff_m size_min }
             "mrol_frontier" FrontierNumbers { voxels center_m min_m max_m view_m view_rotation target_m yaw_rad elevation_rad has_view reserved }
             "mrol_frontier_answers" FrontierPlaces { struct_size capacity frontiers }
-            "mrol_grid_question" GridQuestion { struct_size scope area_min_m area_max_m min_z_m max_z_m cell_m has_area has_min_z has_max_z tell_unknown reserved }
-            "mrol_grid_shape" GridShape { cell_m origin_m cells reserved }
+            "mrol_grid_question" GridQuestion { struct_size scope area_min_m area_max_m min_z_m max_z_m cell_m has_area has_min_z has_max_z tell_unknown band_from reserved }
+            "mrol_grid_shape" GridShape { cell_m origin_m cells floor_min_m floor_max_m }
             "mrol_grid_answers" GridPlaces { struct_size capacity shape occupied tops_m is_free }
         };
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));

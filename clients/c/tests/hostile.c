@@ -384,7 +384,9 @@ static void bad_rays_points_and_grids(mrol_replica replica) {
     GRID_FAILS("answers.shape is NULL");
     cells.shape = &shape, grid.has_area = 2;
     GRID_FAILS("question.has_area must be 0 or 1");
-    grid.has_area = 0, grid.cell_m = 0.15;
+    grid.has_area = 0, grid.band_from = 2;
+    GRID_FAILS("question.band_from must be 0 or 1, got 2");
+    grid.band_from = MROL_BAND_FROM_MAP, grid.cell_m = 0.15;
     GRID_FAILS("cell_m must be a whole number of voxels");
     grid.cell_m = 0;
     GRID_FAILS("answers.capacity must be at least 3, got 2");

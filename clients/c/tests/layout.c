@@ -303,13 +303,15 @@ int main(void) {
     FIELD(mrol_grid_question, has_min_z);
     FIELD(mrol_grid_question, has_max_z);
     FIELD(mrol_grid_question, tell_unknown);
+    FIELD(mrol_grid_question, band_from);
     FIELD(mrol_grid_question, reserved);
     SIZE(mrol_grid_question);
 
     FIELD(mrol_grid_shape, cell_m);
     FIELD(mrol_grid_shape, origin_m);
     FIELD(mrol_grid_shape, cells);
-    FIELD(mrol_grid_shape, reserved);
+    FIELD(mrol_grid_shape, floor_min_m);
+    FIELD(mrol_grid_shape, floor_max_m);
     SIZE(mrol_grid_shape);
 
     FIELD(mrol_grid_answers, struct_size);

@@ -244,6 +244,7 @@ static void project_grid(void) {
     question.scope.level = (uint32_t)number();
     question.scope.ignore_keep_outs = ignores;
     question.has_min_z = question.has_max_z = 1;
+    question.band_from = MROL_BAND_FROM_MAP;
     question.min_z_m = number(), question.max_z_m = number();
     places.shape = &shape;
     if (mrol_replica_project_grid(replica, &question, &places, NULL, &error) != MROL_OK) return;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mrol_client::map::Lookup;
-use mrol_client::planning::{GridArea, MeasuredTo, Surroundings, Unknown};
+use mrol_client::planning::{BandFrom, GridArea, MeasuredTo, Surroundings, Unknown};
 use mrol_client::service::{
     CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck, NearestQuestion,
     PointQuery, PoseCheck, RayQuestion, RaysToward, Reason, ServiceError, SphereCheck,
@@ -357,7 +357,7 @@ impl NativeMap {
     }
 
     /// What does the map look like from above?
-    #[pyo3(signature = (scope, *, area, min_z_m, max_z_m, cell_m, tell_unknown))]
+    #[pyo3(signature = (scope, *, area, min_z_m, max_z_m, band_from, cell_m, tell_unknown))]
     #[expect(clippy::too_many_arguments, reason = "they are the fields of the question")]
     fn grid<'py>(
         &self,
@@ -366,6 +366,7 @@ impl NativeMap {
         area: Option<Corners<2>>,
         min_z_m: Option<f64>,
         max_z_m: Option<f64>,
+        band_from: &str,
         cell_m: Option<f64>,
         tell_unknown: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
@@ -373,9 +374,10 @@ impl NativeMap {
             let area = area
                 .map_or(GridArea::Occupied, |Corners { min_m, max_m }| GridArea::Rectangle { min_m, max_m });
             let band_m = [min_z_m.unwrap_or(f64::NEG_INFINITY), max_z_m.unwrap_or(f64::INFINITY)];
+            let band_from = if band_from == "map" { BandFrom::Map } else { BandFrom::Floor };
             let question = GridQuestion {
                 asked: Scope::asked(scope),
-                scope: GridScope { area, band_m, cell_m, tells_unknown: tell_unknown },
+                scope: GridScope { area, band_m, band_from, cell_m, tells_unknown: tell_unknown },
             };
             let answered = self.source.get()?.ask(py, question)?;
             let grid = answered.answer;
@@ -389,6 +391,7 @@ impl NativeMap {
                 occupied = of_words(py, &grid.occupied, cells),
                 free = grid.free.map(|free| of_words(py, &free, cells)),
                 tops_m = PyArray1::from_vec(py, grid.tops_m),
+                floor_m = grid.floor_m,
             )
         })
     }

@@ -167,6 +167,7 @@ EYE = np.eye(4)
         ("radius_m", lambda m: m.nearest(POINTS, None)),
         ("box", lambda m: m.frontiers([0, 0, 0])),
         ("area", lambda m: m.grid([[0, 0, 0], [1, 1, 1]])),
+        ("band_from", lambda m: m.grid(band_from="roof")),
         ("box.size_m", lambda m: m.voxels(box=mrol.OrientedBox(EYE, [1, 2]))),
         ("view.fov_rad", lambda m: m.voxels(view=mrol.View(EYE, [1], [1, 2]))),
         ("point", lambda m: m.observers()),

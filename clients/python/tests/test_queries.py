@@ -102,7 +102,7 @@ def test_a_distance_field_is_zero_where_voxels_are(hall: mrol.Map) -> None:
 
 
 def test_the_map_from_above_has_the_walls_and_the_post(hall: mrol.Map) -> None:
-    grid = hall.grid(min_z_m=-1, max_z_m=1, cell_m=0.1, tell_unknown=True)
+    grid = hall.grid(min_z_m=-1, max_z_m=1, band_from="map", cell_m=0.1, tell_unknown=True)
     assert grid.free is not None
     west, east, south, north = grid.extent_m
     row, column = (int((y - south) / grid.cell_m) for y in (0,)), int((3.98 - west) / grid.cell_m)
@@ -116,10 +116,21 @@ def test_the_map_from_above_has_the_walls_and_the_post(hall: mrol.Map) -> None:
     assert part.free is None
 
 
+def test_heights_of_a_grid_count_from_the_floor(hall: mrol.Map) -> None:
+    told = hall.grid(min_z_m=0.1, max_z_m=1)
+    assert told.floor_m is not None
+    low, high = told.floor_m
+    assert low == pytest.approx(high)
+    same = hall.grid(min_z_m=low + 0.1, max_z_m=low + 1, band_from="map")
+    assert same.floor_m is None
+    np.testing.assert_array_equal(told.occupied, same.occupied)
+    assert hall.whole_grid(min_z_m=0.1, max_z_m=1).floor_m == told.floor_m
+
+
 @pytest.mark.parametrize("tell_unknown", [False, True])
 def test_a_whole_grid_of_tiles_is_the_grid_at_once(hall: mrol.Map, tell_unknown: bool) -> None:
     # Of 800 cells of a tenth of a meter along x: four tiles.
-    options: dict[str, Any] = {"area": [[-40, -3], [40, 3]], "min_z_m": -1, "max_z_m": 1, "tell_unknown": tell_unknown}
+    options: dict[str, Any] = {"area": [[-40, -3], [40, 3]], "min_z_m": -1, "max_z_m": 1, "band_from": "map", "tell_unknown": tell_unknown}
     tiles: list[tuple[int, int | None]] = []
     at_once, whole = hall.grid(**options), hall.whole_grid(**options, progress=lambda done, of: tiles.append((done, of)))
     assert len(tiles) > 1
@@ -131,7 +142,7 @@ def test_a_whole_grid_of_tiles_is_the_grid_at_once(hall: mrol.Map, tell_unknown:
 
 
 def test_a_whole_grid_of_nothing_has_no_cells(hall: mrol.Map) -> None:
-    assert hall.whole_grid(min_z_m=50, max_z_m=60).occupied.size == 0
+    assert hall.whole_grid(min_z_m=50, max_z_m=60, band_from="map").occupied.size == 0
 
 
 def test_a_whole_grid_that_takes_more_memory_than_answers_may_says_so(hall: mrol.Map, server: Server) -> None:

@@ -50,7 +50,7 @@ export async function freeSpace(session, bounds, [low, high]) {
   const sides = [0, 1].map((axis) => bounds.max[axis] - bounds.min[axis]);
   const finest = levelFor(session.forest, sides, GRID_CELLS_MAX, Math.min(1, session.forest.top));
   const area = { min_m: bounds.min.slice(0, 2), max_m: bounds.max.slice(0, 2) };
-  const ask = (level) => send("POST", pathOf(session.name, "grid"), { area, min_z_m: low, max_z_m: high, level, tell_unknown: true });
+  const ask = (level) => send("POST", pathOf(session.name, "grid"), { area, min_z_m: low, max_z_m: high, band_from: "map", level, tell_unknown: true });
   const { answer } = await askCoarser(session.forest, finest, ask);
   const { cell_m, origin_m, size, occupied, free } = answer;
   const shape = new Shape();

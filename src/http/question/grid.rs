@@ -23,8 +23,9 @@ use crate::http::forms::Map;
 use crate::http::forms::Object;
 use crate::http::forms::{GridTileBytes, QuestionBytes};
 use crate::http::middleware::Service;
-use crate::json::{JsonVersion, Sizes2, Vector2};
+use crate::json::{ByKeyword, JsonVersion, Sizes2, Vector2, described};
 use mrol_client::wire::{framed, pb};
+use mrol_map::planning::BandFrom;
 use mrol_service::{GridQuestion, ServiceError};
 
 question_body! {
@@ -38,6 +39,10 @@ question_body! {
         min_z_m: Option<f64>,
         /// Higher voxels do not count, meters.
         max_z_m: Option<f64>,
+        /// Whether these heights count from the floor or from z = 0 of the map; `floor` without.
+        #[schema(value_type = described::BandFrom, required = false)]
+        #[serde(default)]
+        band_from: ByKeyword<BandFrom>,
         /// Side of a cell, meters: a whole number of voxels; one without.
         cell_m: Option<f64>,
         /// Whether free cells are told from unknown ones; false without.
@@ -75,6 +80,11 @@ pub(in crate::http) struct GridHead {
     #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     cells_free: Option<u64>,
+    /// The lowest and the highest floor of these cells, meters of the map frame, where heights count from the floor and it
+    /// reaches any.
+    #[schema(value_type = Option<Vector2>, nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    floor_m: Option<[f64; 2]>,
 }
 
 /// The map from above, row by row from the smallest y.
@@ -85,7 +95,7 @@ struct GridResponse {
     head: GridHead,
     /// Whether each cell is occupied.
     occupied: Vec<bool>,
-    /// The height of each cell's highest voxel; null of a cell without one.
+    /// The height of each cell's highest voxel in the map frame; null of a cell without one.
     tops_m: Vec<Option<f32>>,
     /// Whether each cell is free, where that is asked for.
     #[schema(nullable = false)]
@@ -110,7 +120,8 @@ impl HttpQuestion for GridBody {
                 pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
             });
         let Self { min_z_m, max_z_m, cell_m, tell_unknown, .. } = self;
-        Ok(pb::ProjectGridRequest { asked: Some(scope), area, min_z_m, max_z_m, cell_m, tell_unknown })
+        let (asked, band_from) = (Some(scope), pb::BandFrom::from(self.band_from.0).into());
+        Ok(pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m, tell_unknown, band_from })
     }
 
     fn answered(answer: AnswerOf<Self>) -> (GridHead, Arrays) {
@@ -121,6 +132,7 @@ impl HttpQuestion for GridBody {
             size: [response.cells_x, response.cells_y],
             cells_occupied: response.cells_occupied,
             cells_free: response.free.as_ref().map(|_| response.cells_free),
+            floor_m: response.floor_min_m.zip(response.floor_max_m).map(|(low, high)| [low, high]),
         };
         let cells = (response.cells_x * response.cells_y) as usize;
         let mut arrays = vec![

@@ -4,7 +4,7 @@ use super::{array, at, ball, framed, map, parts, poses, row_of_voxels, same};
 
 use mrol::geometry::Point;
 use mrol::map::Region;
-use mrol::planning::{GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
+use mrol::planning::{BandFrom, GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol::service::{
     Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck,
     RayQuestion, RaysToward, SphereCheck,
@@ -155,7 +155,13 @@ async fn nearest_voxels_are_found_alike_everywhere() {
 async fn the_map_is_drawn_from_above_alike_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let area = GridArea::Rectangle { min_m: [0.0, -0.1], max_m: [0.4, 0.2] };
-    let scope = GridScope { area, band_m: [0.0, 1.0], cell_m: Some(0.2), tells_unknown: false };
+    let scope = GridScope {
+        area,
+        band_m: [0.0, 1.0],
+        band_from: BandFrom::Map,
+        cell_m: Some(0.2),
+        tells_unknown: false,
+    };
     let question = GridQuestion { asked: Asked::default(), scope };
     let told = client.project_grid(&map(), question).await.unwrap();
     // Cells begin at whole multiples of their side: y from -0.2 on.

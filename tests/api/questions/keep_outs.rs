@@ -4,7 +4,7 @@ use super::{array, at, ball, but_keep_outs, framed, map, parts, poses, row_and_c
 
 use mrol::geometry::Point;
 use mrol::map::{KeepOutName, Region};
-use mrol::planning::{GridArea, MeasuredTo, Met, Surroundings, Unknown};
+use mrol::planning::{BandFrom, GridArea, MeasuredTo, Met, Surroundings, Unknown};
 use mrol::service::{
     Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck,
     RayQuestion, RaysToward,
@@ -145,7 +145,13 @@ async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
 async fn keep_outs_are_occupied_in_the_map_from_above_unless_they_are_ignored() {
     let (daemon, client, replica) = row_and_crate().await;
     let area = GridArea::Rectangle { min_m: [0.0, 0.0], max_m: [0.4, 1.2] };
-    let scope = |band_m| GridScope { area, band_m, cell_m: Some(0.2), tells_unknown: false };
+    let scope = |band_m| GridScope {
+        area,
+        band_m,
+        band_from: BandFrom::Map,
+        cell_m: Some(0.2),
+        tells_unknown: false,
+    };
     let question = GridQuestion { asked: Asked::default(), scope: scope([0.0, 1.0]) };
     let told = client.project_grid(&map(), question).await.unwrap().answer;
     assert_eq!((told.size, told.occupied.clone()), ([2, 6], vec![0b1100_0000_0011]));

@@ -1,6 +1,7 @@
 //! Questions of planners: the same answers over gRPC, over HTTP in both forms, and from a replica.
 
 mod alike;
+mod floor;
 mod keep_outs;
 mod part_of_a_map;
 mod refused;

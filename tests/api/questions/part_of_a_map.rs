@@ -5,7 +5,7 @@ use super::{at, ball, map, poses, row_and_crate};
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::geometry::Point;
 use mrol::map::Region;
-use mrol::planning::{GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
+use mrol::planning::{BandFrom, GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol::service::{
     Asked, CheckAs, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, Question, RayQuestion,
     RaysToward, SphereCheck,
@@ -126,7 +126,7 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
         let area = area.map_or(GridArea::Occupied, |[min_m, max_m]| GridArea::Rectangle { min_m, max_m });
         let question = GridQuestion {
             asked: Asked::default(),
-            scope: GridScope { area, band_m, cell_m: None, tells_unknown: false },
+            scope: GridScope { area, band_m, band_from: BandFrom::Map, cell_m: None, tells_unknown: false },
         };
         let own = part.ask(&question);
         assert_eq!(own.is_ok(), is_known, "{area:?} {band_m:?}");

@@ -4,7 +4,7 @@ use mrol::client::Client;
 use mrol::geometry::Pose;
 use mrol::map::RobotName;
 use mrol::mapping::Guess;
-use mrol::planning::{Grid, GridArea};
+use mrol::planning::{BandFrom, Grid, GridArea};
 use mrol::service::{Asked, GridQuestion, GridScope, PointCloud, ScanRequest};
 use mrol::wire::pb;
 use prost::Message;
@@ -14,7 +14,7 @@ use super::map;
 use crate::support::daemon::{Daemon, json_of};
 
 fn question(area: GridArea, cell_m: Option<f64>, tells_unknown: bool) -> GridQuestion {
-    let scope = GridScope { area, band_m: [-0.5, 0.5], cell_m, tells_unknown };
+    let scope = GridScope { area, band_m: [-0.5, 0.5], band_from: BandFrom::Map, cell_m, tells_unknown };
     GridQuestion { asked: Asked::default(), scope }
 }
 

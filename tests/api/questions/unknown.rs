@@ -3,7 +3,7 @@
 use super::{array, at, ball, framed, map, parts, poses, row_of_voxels, same};
 
 use mrol::geometry::Point;
-use mrol::planning::{Frontiers, GridArea, PointState, Sphere, Surroundings, Unknown};
+use mrol::planning::{BandFrom, Frontiers, GridArea, PointState, Sphere, Surroundings, Unknown};
 use mrol::service::{
     Asked, CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck, PoseCheck,
     RayQuestion, RaysToward, SphereCheck,
@@ -124,7 +124,13 @@ async fn a_map_that_nobody_saw_has_no_frontier_and_no_free_cell() {
     );
 
     let area = GridArea::Rectangle { min_m: [0.0, -0.1], max_m: [0.4, 0.2] };
-    let scope = GridScope { area, band_m: [0.0, 1.0], cell_m: Some(0.2), tells_unknown: true };
+    let scope = GridScope {
+        area,
+        band_m: [0.0, 1.0],
+        band_from: BandFrom::Map,
+        cell_m: Some(0.2),
+        tells_unknown: true,
+    };
     let question = GridQuestion { asked: Asked::default(), scope };
     let told = client.project_grid(&map(), question).await.unwrap();
     assert_eq!(

@@ -1,6 +1,6 @@
 //! The map from above, as a 2-D grid.
 
-use mrol_client::planning::{Grid, GridArea};
+use mrol_client::planning::{BandFrom, Grid, GridArea};
 use mrol_client::service::GridScope;
 
 use super::{Form, Scope, check_reserved, ones, unless_zero};
@@ -24,7 +24,8 @@ pub struct GridQuestion {
     pub(crate) has_min_z: u8,
     pub(crate) has_max_z: u8,
     pub(crate) tell_unknown: u8,
-    pub(crate) reserved: [u8; 4],
+    pub(crate) band_from: u8,
+    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -40,7 +41,8 @@ pub(crate) struct GridShape {
     pub(crate) cell_m: f64,
     pub(crate) origin_m: [f64; 2],
     pub(crate) cells: [u64; 2],
-    pub(crate) reserved: [u64; 2],
+    pub(crate) floor_min_m: f64,
+    pub(crate) floor_max_m: f64,
 }
 
 /// `mrol_grid_answers`.
@@ -74,13 +76,22 @@ impl GridQuestion {
             false => GridArea::Occupied,
         };
         let tells_unknown = flag(self.tell_unknown, "question.tell_unknown")?;
-        Ok(GridScope { area, band_m: [low_m, high_m], cell_m: unless_zero(self.cell_m), tells_unknown })
+        let band_from = match self.band_from {
+            0 => BandFrom::Floor,
+            1 => BandFrom::Map,
+            other => {
+                return Err(Failure::argument(format!("question.band_from must be 0 or 1, got {other}")));
+            }
+        };
+        let (band_m, cell_m) = ([low_m, high_m], unless_zero(self.cell_m));
+        Ok(GridScope { area, band_m, band_from, cell_m, tells_unknown })
     }
 }
 
 fn shape_of(grid: &Grid) -> GridShape {
     let cells = grid.size.map(|cells| cells as u64);
-    GridShape { cell_m: grid.cell_m, origin_m: grid.origin_m, cells, reserved: [0; 2] }
+    let [floor_min_m, floor_max_m] = grid.floor_m.unwrap_or([f64::NAN; 2]);
+    GridShape { cell_m: grid.cell_m, origin_m: grid.origin_m, cells, floor_min_m, floor_max_m }
 }
 
 impl GridPlaces {

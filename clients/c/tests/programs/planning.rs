@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mrol_client::Client;
 use mrol_client::map::{KeepOutName, KeepOutShape, Region};
-use mrol_client::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
+use mrol_client::planning::{BandFrom, Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol_client::service::{
     Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
     PoseCheck, PutKeepOut, RayQuestion, RaysToward, SphereCheck,
@@ -205,8 +205,13 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
 }
 
 async fn grids(driver: &mut Driver, client: &Client, asked: Asked) {
-    let scope =
-        GridScope { area: GridArea::Occupied, band_m: [-1.0, 2.0], cell_m: None, tells_unknown: false };
+    let scope = GridScope {
+        area: GridArea::Occupied,
+        band_m: [-1.0, 2.0],
+        band_from: BandFrom::Map,
+        cell_m: None,
+        tells_unknown: false,
+    };
     let told = client.project_grid(&map(), GridQuestion { asked, scope }).await.unwrap();
     let (grid, [x, y]) = (&told.answer, told.answer.size);
     assert!(grid.cells() > 0);

@@ -36,7 +36,10 @@ pub use frontiers::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, FrontierView, Frontiers,
     STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,
 };
-pub use grid::{Grid, GridArea, GridError, GridExtent, GridRequest, grid_extent, project_grid};
+pub use grid::{
+    BandFrom, Floor, Grid, GridArea, GridError, GridExtent, GridRequest, find_floor, grid_extent,
+    project_grid, project_grid_above,
+};
 pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
 pub use planner::{Planner, PlanningView};
 pub use rays::{DIRECTION_LENGTH_TOLERANCE, RayError, RayHits, Rays, Toward, cast_rays, cast_rays_in_sight};

@@ -159,6 +159,7 @@ reasons! {
         GuessRequired "guess_required" Both: "the robot has no accepted scan here, the map is not empty, and there is no guess", "give `guess`, or use `localize` first";
         MapEmpty "map_empty" Both: "the map has nothing to localize in", "insert a scan first";
         MapReplaced "map_replaced" Both: "the map is another one by now", "read its `map_uuid` and start again";
+        NoFloor "no_floor" Both: "a grid's band counts from the floor, and the map has no poses of sensors or no floor below them", "give `band_from` `map`, and heights from z = 0 of the map";
         NoJournal "no_journal" Both: "the server keeps maps in memory only; undo and the list of observers need a journal", "start it with `--data-dir`";
         NotUndoable "not_undoable" Both: "the revision was made by an undo or a keep-out, or what it made was undone already", "send what was undone again, or delete it again; put or delete the keep-out again";
         OutsideUndoWindow "outside_undo_window" Both: "the scan or deletion is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";

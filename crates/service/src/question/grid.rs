@@ -8,7 +8,7 @@ use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::work::check_not_stopped;
 use mrol_map::map::ContentVersion;
-use mrol_map::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
+use mrol_map::planning::{BandFrom, Grid, GridArea, GridError, GridRequest, project_grid};
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::Lattice;
 
@@ -28,6 +28,8 @@ pub struct GridScope {
     pub area: GridArea,
     /// Lowest and highest height, meters, between which voxels reach that count; infinite ones are fine.
     pub band_m: [f64; 2],
+    /// What these heights count from.
+    pub band_from: BandFrom,
     /// Side of a cell, meters: a whole number of the level's voxels. One voxel without.
     pub cell_m: Option<f64>,
     /// True where cells without a voxel are told apart: free ones and unknown ones.
@@ -39,17 +41,25 @@ const BYTES_EACH: usize = 5;
 /// Bytes of a cell that is told to be free or unknown while that is found: how many of its columns are free.
 const WORK_BYTES_EACH: usize = 4;
 
+impl GridScope {
+    /// True where the floor has to be found for it: a band without bounds counts from nothing.
+    pub(super) fn needs_floor(&self) -> bool {
+        self.band_from == BandFrom::Floor && self.band_m.iter().any(|c| c.is_finite())
+    }
+}
+
 impl GridQuestion {
     /// Most cells of an answer.
-    fn cells_max(limits: &Limits) -> usize {
+    pub(super) fn cells_max(limits: &Limits) -> usize {
         limits.grid_cells_max.min(limits.message_bytes_max / BYTES_EACH)
     }
 
     /// What is to be drawn of a map with this lattice, in at most so many cells.
     pub(super) fn request(&self, lattice: &Lattice, cells_max: usize) -> GridRequest {
-        let (GridScope { area, band_m, cell_m, tells_unknown }, level) = (self.scope, self.asked.level);
+        let (GridScope { area, band_m, band_from, cell_m, tells_unknown }, level) =
+            (self.scope, self.asked.level);
         let cell_m = cell_m.unwrap_or_else(|| lattice.resolution_m(level));
-        GridRequest { level, area, band_m, cell_m, tells_unknown, cells_max }
+        GridRequest { level, area, band_m, band_from, cell_m, tells_unknown, cells_max }
     }
 }
 
@@ -75,6 +85,12 @@ impl Question for GridQuestion {
         usize::MAX
     }
 
+    /// The floor is found among all voxels of the map: that may take longer than one part of an answer, and lets others
+    /// go first between its own.
+    fn is_in_parts(&self) -> bool {
+        self.scope.needs_floor()
+    }
+
     fn check(&self, _: &Limits) -> Result<(), ServiceError> {
         Ok(())
     }
@@ -87,13 +103,19 @@ impl Question for GridQuestion {
     ) -> Result<(Grid, ContentVersion), ServiceError> {
         let mut view = map.pausing_view(&self.asked);
         let request = self.request(view.lattice(), Self::cells_max(limits));
-        let grid = project_grid(&mut view, &request, stop)?;
+        let grid = project_grid(&mut view, &request, stop);
+        // What was stopped may lack the floor.
         check_not_stopped(stop)?;
-        Ok((grid, view.version()))
+        Ok((grid?, view.version()))
     }
 
     fn check_known(&self, answer: &Grid, known: &KnownPart) -> Result<(), ServiceError> {
         let GridScope { area, band_m, .. } = self.scope;
+        if self.scope.needs_floor() {
+            let message = "band_from must be map where a replica copies a region: the floor is found below the poses of \
+                           the whole map";
+            return Err(ServiceError::new(Reason::PointOutOfRange, message));
+        }
         if area == GridArea::Occupied {
             let message =
                 "area must be given where a replica copies a region: what is occupied elsewhere is not known";
@@ -118,6 +140,7 @@ impl From<GridError> for ServiceError {
                 Self::new(Reason::GridTooLarge, message)
             }
             GridError::BandRange { .. } => Self::new(Reason::PointOutOfRange, error.to_string()),
+            GridError::NoPoses | GridError::NoFloor { .. } => Self::new(Reason::NoFloor, error.to_string()),
             _ => Self::new(Reason::BadGrid, error.to_string()),
         }
     }
@@ -139,7 +162,8 @@ mod tests {
         let map = MapName::new("site").unwrap();
         service.create_map(map.clone(), MapSettings::new(0.1, 1)).await.unwrap();
         let band_m = [f64::NEG_INFINITY, f64::INFINITY];
-        let scope = GridScope { area: GridArea::Occupied, band_m, cell_m: None, tells_unknown: false };
+        let (area, band_from) = (GridArea::Occupied, BandFrom::Map);
+        let scope = GridScope { area, band_m, band_from, cell_m: None, tells_unknown: false };
         let error = service.ask(&map, GridQuestion { asked: Asked::default(), scope }).await.unwrap_err();
         assert_eq!(error.reason, Reason::TimeLimit);
         for way_out in ["StreamGrid", "/grid/tiles", "cell_m", "limits.question_time_max_s"] {

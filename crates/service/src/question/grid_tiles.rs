@@ -1,5 +1,6 @@
 //! A large grid in tiles, one after the other.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio_stream::Stream;
@@ -15,7 +16,7 @@ use crate::map_service::MapService;
 use crate::watch::{Teller, stream_of};
 use crate::work::check_not_stopped;
 use mrol_map::map::{ContentVersion, MapName};
-use mrol_map::planning::{Grid, GridArea, GridExtent, GridRequest, grid_extent};
+use mrol_map::planning::{Floor, Grid, GridArea, GridExtent, GridRequest, grid_extent, project_grid_above};
 use mrol_map::util::StopSignal;
 
 /// Most cells of a grid in tiles: 1.6 km by 1.6 km of cells of 0.1 m.
@@ -90,7 +91,7 @@ impl GridTiles {
 
     /// The tiles along x and y, from which to which: they begin at whole multiples of their sides.
     fn columns_and_rows(&self) -> [std::ops::Range<i64>; 2] {
-        let (GridExtent { first, size, .. }, side) = (self.extent, self.side());
+        let (&GridExtent { first, size, .. }, side) = (&self.extent, self.side());
         std::array::from_fn(|axis| {
             let end = first[axis] + size[axis] as i64;
             let is_none = size[axis] == 0;
@@ -101,7 +102,7 @@ impl GridTiles {
 
     /// The cells of tile `number`: the first, and the one behind the last.
     fn cells(&self, number: usize) -> [[i64; 2]; 2] {
-        let (GridExtent { first, size, .. }, side) = (self.extent, self.side());
+        let (&GridExtent { first, size, .. }, side) = (&self.extent, self.side());
         let [columns, rows] = self.columns_and_rows();
         let width = ((columns.end - columns.start) as usize).max(1);
         let at = [columns.start + (number % width) as i64, rows.start + (number / width) as i64];
@@ -129,7 +130,8 @@ impl GridTiles {
     /// # Errors
     /// As a question has them; `DeadlineExceeded` after `grid_time_max_s`. After an error comes no other tile.
     pub async fn next(&mut self) -> Result<GridTile, ServiceError> {
-        let (number, GridExtent { cell_m, first: begin, size, .. }) = (self.next, self.extent);
+        let GridExtent { cell_m, first: begin, size, .. } = self.extent;
+        let (number, floor) = (self.next, self.extent.floor.clone());
         let tiles = self.columns_and_rows().map(|range| (range.end - range.start) as usize);
         let tiles = tiles[0] * tiles[1];
         let limit_s = self.service.limits().grid_time_max_s;
@@ -146,7 +148,7 @@ impl GridTiles {
             question.scope = GridScope { area: self.area([first, end]), ..question.scope };
         }
         let cells = std::array::from_fn(|axis| (end[axis] - first[axis]).max(0) as usize);
-        let grid = self.service.ask(&self.map, TileQuestion { question, cells }).await?;
+        let grid = self.service.ask(&self.map, TileQuestion { question, cells, floor }).await?;
         self.next += 1;
         let first = std::array::from_fn(|axis| (first[axis] - begin[axis]).max(0) as usize);
         Ok(GridTile { origin_m, size, tiles: tiles.max(1), first, is_last: self.next >= tiles, grid })
@@ -174,6 +176,8 @@ struct ExtentQuestion(GridQuestion);
 struct TileQuestion {
     question: GridQuestion,
     cells: [usize; 2],
+    /// What the band counts from, in all tiles: it was found for the first revision.
+    floor: Option<Arc<Floor>>,
 }
 
 impl Question for ExtentQuestion {
@@ -194,6 +198,10 @@ impl Question for ExtentQuestion {
         usize::MAX
     }
 
+    fn is_in_parts(&self) -> bool {
+        self.0.is_in_parts()
+    }
+
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
         self.0.check(limits)
     }
@@ -206,9 +214,9 @@ impl Question for ExtentQuestion {
     ) -> Result<(GridExtent, ContentVersion), ServiceError> {
         let mut view = map.pausing_view(&self.0.asked);
         let request: GridRequest = self.0.request(view.lattice(), TILED_CELLS_MAX);
-        let extent = grid_extent(&mut view, &request, stop)?;
+        let extent = grid_extent(&mut view, &request, stop);
         check_not_stopped(stop)?;
-        Ok((extent, view.version()))
+        Ok((extent?, view.version()))
     }
 
     fn check_known(&self, _: &GridExtent, _: &KnownPart) -> Result<(), ServiceError> {
@@ -248,7 +256,13 @@ impl Question for TileQuestion {
                 let request = self.question.request(view.lattice(), 0);
                 Ok(Grid::empty(request.cell_m, [0.0; 2], [0; 2], request.tells_unknown))
             })?,
-            _ => self.question.answer_from(map, limits, stop)?,
+            _ => {
+                let mut view = map.pausing_view(&self.question.asked);
+                let request = self.question.request(view.lattice(), GridQuestion::cells_max(limits));
+                let grid = project_grid_above(&mut view, &request, self.floor.as_deref(), stop)?;
+                check_not_stopped(stop)?;
+                (grid, view.version())
+            }
         };
         Ok((grid, version))
     }

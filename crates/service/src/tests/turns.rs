@@ -20,7 +20,7 @@ use mrol_map::map::{
     MapName, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, SHARDS, ScanRecord,
     ViewpointRecord,
 };
-use mrol_map::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
+use mrol_map::planning::{BandFrom, Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol_map::util::{GiveWay, StopSignal};
 use mrol_map::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 use mrol_map::voxel::VoxelSet;
@@ -138,7 +138,10 @@ fn every_kind_of_long_question_gives_way_between_its_parts_and_is_answered_the_s
     };
     let grid = |area, tells_unknown| {
         let band_m = [0.0, 2.0];
-        GridQuestion { asked, scope: GridScope { area, band_m, cell_m: None, tells_unknown } }
+        GridQuestion {
+            asked,
+            scope: GridScope { area, band_m, band_from: BandFrom::Map, cell_m: None, tells_unknown },
+        }
     };
     let area = GridArea::Rectangle { min_m: [0.0; 2], max_m: [4.0; 2] };
     let classified = ClassifyQuestion { asked, points: points(300_000).into() };

@@ -15,7 +15,7 @@ from .._transport.deadline import Deadline
 from .._transport.request import BYTES, Request
 from ..errors import BadAnswer
 from ..progress import Progress, checked_progress, progress_of
-from ..questions.grid import Grid, fields_of_grid
+from ..questions.grid import BandFrom, Grid, fields_of_grid
 from ..questions.scope import QUESTION, QuestionScope
 from ..version import Version
 from .framing import failure_of, next_message
@@ -46,6 +46,7 @@ class WholeGridOperations(MapHandle):
         *,
         min_z_m: float | None = None,
         max_z_m: float | None = None,
+        band_from: BandFrom = "floor",
         cell_m: float | None = None,
         tell_unknown: bool = False,
         progress: Progress = None,
@@ -57,9 +58,9 @@ class WholeGridOperations(MapHandle):
         told of the tiles; what it raises ends it.
 
         Raises `ResourceExhausted` (`grid_too_large`), `DeadlineExceeded` (`time_limit`, beyond `grid_time_max_s`),
-        `InvalidArgument` (`bad_grid`, `point_out_of_range`), and `BadAnswer` where it takes more than `answer_bytes_max`.
+        `InvalidArgument` (`bad_grid`, `point_out_of_range`), `FailedPrecondition` (`no_floor`), and `BadAnswer` where it takes more than `answer_bytes_max`.
         """
-        fields = fields_of_grid(area, min_z_m, max_z_m, cell_m, tell_unknown)
+        fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown)
         request = Request("POST", self._target("grid", "tiles"), BYTES, body_of_question({**fields, **QUESTION.checked(scope)}))
         bounds, joined = self._caller.bounds, _Tiles(self._caller.bounds.answer_bytes_max)
         with progress_of(checked_progress(progress), self._name, None) as told, self._caller.stream(request) as body:
@@ -82,6 +83,7 @@ class _Tiles:
         self.count = 0
         self.expected = 1
         self._versions: list[Version] = []
+        self._floors_m: list[float] = []
 
     @property
     def are_all(self) -> bool:
@@ -105,6 +107,7 @@ class _Tiles:
         self._tops_m[where] = np.frombuffer(tops_m, "<f4").reshape(rows, columns)
         if self._free is not None:
             self._free[where] = unpacked(part.data(10), cells).reshape(rows, columns)
+        self._floors_m += [part.double(12), part.double(13)] if part.has(12) and part.has(13) else []
         version = part.message(9)
         content_hash = version.whole(3) if version.has(3) else None
         self._versions = [*self._versions[:1], Version(version.whole(1), version.text(2), content_hash)]
@@ -135,5 +138,6 @@ class _Tiles:
             occupied=self._occupied,
             tops_m=np.where(np.isfinite(self._tops_m), self._tops_m, np.float32(np.nan)),
             free=self._free,
+            floor_m=(min(self._floors_m), max(self._floors_m)) if self._floors_m else None,
             first_version=self._versions[0],
         )

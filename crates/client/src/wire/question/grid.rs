@@ -4,7 +4,7 @@ use super::asked::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, required, words_of};
 use mrol_map::map::MapName;
-use mrol_map::planning::{Grid, GridArea};
+use mrol_map::planning::{BandFrom, Grid, GridArea};
 use mrol_service::{Answered, GridQuestion, GridScope, GridTile, Reason, ServiceError};
 
 impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
@@ -16,11 +16,20 @@ impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
             min_m: [area.min_x_m, area.min_y_m],
             max_m: [area.max_x_m, area.max_y_m],
         });
+        let band_from = match pb::BandFrom::try_from(request.band_from) {
+            Ok(pb::BandFrom::Unspecified | pb::BandFrom::Floor) => BandFrom::Floor,
+            Ok(pb::BandFrom::Map) => BandFrom::Map,
+            Err(_) => {
+                let message = format!("band_from must be 0, 1 (floor) or 2 (map), got {}", request.band_from);
+                return Err(ServiceError::new(Reason::BadGrid, message));
+            }
+        };
         let low_m = request.min_z_m.unwrap_or(f64::NEG_INFINITY);
         let high_m = request.max_z_m.unwrap_or(f64::INFINITY);
         let scope = GridScope {
             area,
             band_m: [low_m, high_m],
+            band_from,
             cell_m: request.cell_m,
             tells_unknown: request.tell_unknown,
         };
@@ -30,7 +39,8 @@ impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
 
 impl From<(&MapName, GridQuestion)> for pb::ProjectGridRequest {
     fn from((map, GridQuestion { asked, scope }): (&MapName, GridQuestion)) -> Self {
-        let GridScope { area, band_m: [low_m, high_m], cell_m, tells_unknown: tell_unknown } = scope;
+        let GridScope { area, band_m: [low_m, high_m], band_from, cell_m, tells_unknown: tell_unknown } =
+            scope;
         let area = match area {
             GridArea::Occupied => None,
             GridArea::Rectangle { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] } => {
@@ -38,15 +48,32 @@ impl From<(&MapName, GridQuestion)> for pb::ProjectGridRequest {
             }
         };
         let asked = Some((map, asked).into());
-        Self { asked, area, min_z_m: Some(low_m), max_z_m: Some(high_m), cell_m, tell_unknown }
+        let band_from = pb::BandFrom::from(band_from).into();
+        Self { asked, area, min_z_m: Some(low_m), max_z_m: Some(high_m), cell_m, tell_unknown, band_from }
+    }
+}
+
+impl From<BandFrom> for pb::BandFrom {
+    fn from(from: BandFrom) -> Self {
+        match from {
+            BandFrom::Floor => Self::Floor,
+            BandFrom::Map => Self::Map,
+        }
     }
 }
 
 impl From<Answered<Grid>> for pb::ProjectGridResponse {
     fn from(Answered { answer, version }: Answered<Grid>) -> Self {
         let cells = answer.cells();
-        let Grid { cell_m, origin_m: [origin_x_m, origin_y_m], size: [x, y], occupied, tops_m, free } =
-            answer;
+        let Grid {
+            cell_m,
+            origin_m: [origin_x_m, origin_y_m],
+            size: [x, y],
+            occupied,
+            tops_m,
+            free,
+            floor_m,
+        } = answer;
         let ones = |words: &[u64]| words.iter().map(|word| u64::from(word.count_ones())).sum();
         let (cells_occupied, cells_free) = (ones(&occupied), free.as_deref().map_or(0, ones));
         Self {
@@ -61,6 +88,8 @@ impl From<Answered<Grid>> for pb::ProjectGridResponse {
             version: Some(version.into()),
             free: free.map(|free| bitmap_of(free, cells)),
             cells_free,
+            floor_min_m: floor_m.map(|[low, _]| low),
+            floor_max_m: floor_m.map(|[_, high]| high),
         }
     }
 }
@@ -78,6 +107,7 @@ impl TryFrom<pb::ProjectGridResponse> for Answered<Grid> {
             occupied: words_of(&response.occupied, cells, "occupied")?,
             tops_m: numbers_of(&response.tops_m_f32le, cells, "tops_m_f32le")?,
             free: response.free.map(|free| words_of(&free, cells, "free")).transpose()?,
+            floor_m: response.floor_min_m.zip(response.floor_max_m).map(|(low, high)| [low, high]),
         };
         answered(grid, response.version)
     }

@@ -14,7 +14,7 @@ use mrol_map::align::localize::LocalizationQuery;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::RobotName;
 use mrol_map::mapping::Guess;
-use mrol_map::planning::{GridArea, Surroundings, Unknown};
+use mrol_map::planning::{BandFrom, GridArea, Surroundings, Unknown};
 use mrol_service::{
     Asked, CheckAs, ClassifyQuestion, GridQuestion, GridScope, LocalizationRequest, MotionCheck, PointCloud,
     PoseCheck, RayQuestion, RaysToward, ScanRequest,
@@ -103,6 +103,7 @@ impl Made {
                 scope: GridScope {
                     area: GridArea::Occupied,
                     band_m: [f64::NEG_INFINITY, f64::INFINITY],
+                    band_from: BandFrom::Map,
                     cell_m: None,
                     tells_unknown: true,
                 },

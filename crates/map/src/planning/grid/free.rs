@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::cells::Cells;
 use super::occupancy_grid::Grid;
-use super::projection::Projection;
+use super::projection::{COLUMNS, Projection};
 use crate::map::{MapView, PausingView};
 use crate::planning::unknown::{CELLS, FreeSpace};
 use crate::util::StopSignal;
@@ -14,8 +14,6 @@ use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
 const BLOCKS_PER_STOP_CHECK: usize = 1024;
 /// Boxes that viewpoints looked into between two checks of the stop signal.
 const BOXES_PER_STOP_CHECK: usize = 4096;
-/// Columns of a block.
-const COLUMNS: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
 
 /// What is looked at with, for as long as nobody else is to go first.
 struct Look<'a> {
@@ -27,7 +25,7 @@ struct Look<'a> {
 /// How many blocks were looked at.
 struct Looks(usize);
 
-impl Projection {
+impl Projection<'_> {
     /// Which cells of `grid`, which are `cells`, are free. Others go first between the stacks of blocks.
     pub(super) fn free_cells(
         &self,
@@ -77,6 +75,7 @@ impl Projection {
         Looks(looks): &mut Looks,
     ) -> Option<[bool; COLUMNS]> {
         let mut is_seen = [false; COLUMNS];
+        let mut bases = None;
         for z in zs {
             *looks += 1;
             if looks.is_multiple_of(BLOCKS_PER_STOP_CHECK) && look.stop.is_stopped() {
@@ -88,10 +87,21 @@ impl Projection {
                 if look.stop.is_stopped() {
                     return None;
                 }
-                self.look_at(block, &mut is_seen, look);
+                let bases = bases.get_or_insert_with(|| self.bases([x, y]));
+                self.look_at(block, bases, &mut is_seen, look);
             }
         }
         Some(is_seen)
+    }
+
+    /// What the band counts from in the columns of a stack of blocks.
+    fn bases(&self, stack: [i32; 2]) -> [i32; COLUMNS] {
+        let [x, y] = stack.map(|i| i.saturating_mul(BLOCK_SIDE));
+        let place = |column: usize| [column as i32 % BLOCK_SIDE, column as i32 / BLOCK_SIDE];
+        std::array::from_fn(|column| {
+            let [dx, dy] = place(column);
+            self.base([x.saturating_add(dx), y.saturating_add(dy)]).height
+        })
     }
 
     /// The cells of which all columns are free, by how many are.
@@ -106,12 +116,19 @@ impl Projection {
     }
 
     /// Notes the columns of a block that have a free voxel in the band.
-    fn look_at(&self, block: VoxelKey, is_seen: &mut [bool; COLUMNS], look: &mut Look<'_>) {
+    fn look_at(
+        &self,
+        block: VoxelKey,
+        bases: &[i32; COLUMNS],
+        is_seen: &mut [bool; COLUMNS],
+        look: &mut Look<'_>,
+    ) {
         let occupied = look.view.level_block(self.level, block);
         for cell in (0..CELLS).map(Cell::from_bits).filter(|cell| !occupied.contains(*cell, 0)) {
             let (voxel, [x, y, _]) = (cell.voxel(block), cell.index());
-            let column = &mut is_seen[x + y * BLOCK_SIDE as usize];
-            if !*column && (self.band[0]..=self.band[1]).contains(&voxel.index()[2]) {
+            let number = x + y * BLOCK_SIDE as usize;
+            let column = &mut is_seen[number];
+            if !*column && self.is_in_band(voxel.index()[2], bases[number]) {
                 *column = look.free_space.is_seen_through(voxel, self.level);
             }
         }
@@ -138,7 +155,7 @@ impl Projection {
                 [cells.first[axis], cells.end[axis]].map(|cell| cell.saturating_mul(self.cell_voxels));
             [block(first), block(end - 1)]
         };
-        let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
+        let bounds = [area(0), area(1), self.heights().map(block)];
         let (mut low_m, mut high_m) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let boxes_m = view.viewpoints().into_iter().flat_map(|viewpoints| viewpoints.boxes_m());
         for [low, high] in stop.paced(boxes_m, BOXES_PER_STOP_CHECK) {

@@ -3,6 +3,7 @@
 
 mod cells;
 mod extent;
+mod floor;
 mod free;
 mod keep_outs;
 mod map_server;
@@ -14,6 +15,7 @@ mod request;
 mod tests;
 
 pub use extent::{GridExtent, grid_extent};
+pub use floor::{Floor, find_floor};
 pub use occupancy_grid::Grid;
-pub use project::project_grid;
-pub use request::{GridArea, GridError, GridRequest};
+pub use project::{project_grid, project_grid_above};
+pub use request::{BandFrom, GridArea, GridError, GridRequest};

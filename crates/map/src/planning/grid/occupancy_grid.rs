@@ -13,12 +13,15 @@ pub struct Grid {
     pub size: [usize; 2],
     /// Whether cell i has a voxel or a keep-out: bit i % 64 of `occupied[i / 64]`.
     pub occupied: Vec<u64>,
-    /// Height of the top of the highest voxel of each cell that reaches into the band, meters, which may lie above it
-    /// by less than a voxel; NaN for a cell without one.
+    /// Height of the top of the highest voxel of each cell that reaches into the band, meters of the map frame, which
+    /// may lie above the band by less than a voxel; NaN for a cell without one.
     pub tops_m: Vec<f32>,
     /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was
     /// not, the grid does not tell what was seen.
     pub free: Option<Vec<u64>>,
+    /// The lowest and the highest floor of these cells, meters of the map frame, where the band counts from the floor
+    /// and the floor reaches any of them.
+    pub floor_m: Option<[f64; 2]>,
 }
 
 impl Grid {
@@ -27,7 +30,7 @@ impl Grid {
         let cells = size[0] * size[1];
         let none = || vec![0; cells.div_ceil(64)];
         let free = tells_unknown.then(none);
-        Self { cell_m, origin_m, size, occupied: none(), tops_m: vec![f32::NAN; cells], free }
+        Self { cell_m, origin_m, size, occupied: none(), tops_m: vec![f32::NAN; cells], free, floor_m: None }
     }
 
     /// Puts a part of this grid in, whose first cell is the cell `first` of this one; false where it does not lie
@@ -38,6 +41,12 @@ impl Grid {
         if !(fits(0) && fits(1)) {
             return false;
         }
+        self.floor_m = match (self.floor_m, part.floor_m) {
+            (Some([low, high]), Some([part_low, part_high])) => {
+                Some([low.min(part_low), high.max(part_high)])
+            }
+            (known, of_part) => known.or(of_part),
+        };
         let bit = |words: &[u64], number: usize| words[number / 64] >> (number % 64) & 1;
         for (y, x) in (0..part.size[1]).flat_map(|y| (0..part.size[0]).map(move |x| (y, x))) {
             let from = y * part.size[0] + x;

@@ -1,7 +1,7 @@
 //! Drawing a grid: voxels, keep-outs, and what is free.
 
 use super::cells::Cells;
-use super::keep_outs;
+use super::floor::{Floor, find_floor};
 use super::occupancy_grid::Grid;
 use super::projection::Projection;
 use super::request::{GridArea, GridError, GridRequest};
@@ -16,6 +16,10 @@ use crate::util::StopSignal;
 /// it, however little, and of a band that is thinner than a voxel those that hold it. So no obstacle is passed over
 /// because the center of its voxel lies above or below, at whatever level.
 ///
+/// Heights count from z = 0 of the map, or in each column of voxels from the floor there ([`find_floor`]). What lies
+/// below the floor, as the bottom of a pit or of stairs that lead down, is in no such band that begins above it, and is
+/// not drawn.
+///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
 /// too; they have no top, and make no grid larger that is as large as what is there.
 ///
@@ -29,7 +33,7 @@ use crate::util::StopSignal;
 /// later revisions than [`PausingView::version`]. Once stopped, the grid lacks voxels.
 ///
 /// # Errors
-/// When a number is out of range, or there are more cells than may be.
+/// When a number is out of range, there are more cells than may be, or no floor is found where the band counts from it.
 ///
 /// [`MapView::with_keep_outs`]: crate::map::MapView::with_keep_outs
 /// [`MapView::with_viewpoints`]: crate::map::MapView::with_viewpoints
@@ -38,11 +42,28 @@ pub fn project_grid(
     request: &GridRequest,
     stop: StopSignal<'_>,
 ) -> Result<Grid, GridError> {
-    let projection = Projection::of(view.lattice(), request)?;
+    // What cannot be drawn is refused before the floor is looked for.
+    Projection::of(view.lattice(), request, None)?;
+    let floor = find_floor(view, request, stop)?;
+    project_grid_above(view, request, floor.as_deref(), stop)
+}
+
+/// [`project_grid`] with a band that counts from `floor`, as [`find_floor`] found it for a request of the same level
+/// and band; without one, from z = 0 of the map.
+///
+/// # Errors
+/// As [`project_grid`] has them.
+pub fn project_grid_above(
+    view: &mut PausingView<'_>,
+    request: &GridRequest,
+    floor: Option<&Floor>,
+    stop: StopSignal<'_>,
+) -> Result<Grid, GridError> {
+    let projection = Projection::of(view.lattice(), request, floor)?;
     let cells = cells_of(&projection, view, request, stop)?;
     let mut grid = projection.grid(view, &cells, stop);
     if let Some(shapes) = Shapes::of(view.view()) {
-        keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
+        projection.mark_keep_outs(&shapes, &cells, &mut grid, request.band_m, stop);
     }
     if request.tells_unknown {
         grid.free = Some(projection.free_cells(view, &cells, &grid, stop));
@@ -52,7 +73,7 @@ pub fn project_grid(
 
 /// The cells of the grid that is asked for.
 pub(super) fn cells_of(
-    projection: &Projection,
+    projection: &Projection<'_>,
     view: &mut PausingView<'_>,
     request: &GridRequest,
     stop: StopSignal<'_>,

@@ -1,5 +1,7 @@
 //! The request: which part of the map, which band of height, how large the cells.
 
+use crate::util::Keyword;
+
 /// What to draw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridRequest {
@@ -10,12 +12,36 @@ pub struct GridRequest {
     /// Lowest and highest height, meters: voxels count that reach between them, by more than a border; where the two
     /// are the same, the voxel there. Infinite ones are fine.
     pub band_m: [f64; 2],
+    /// What these heights count from.
+    pub band_from: BandFrom,
     /// Side of a cell, meters: a whole number of the level's voxels.
     pub cell_m: f64,
     /// True where cells without a voxel are told apart: free ones and unknown ones. It takes more time.
     pub tells_unknown: bool,
     /// Most cells of the grid.
     pub cells_max: usize,
+}
+
+/// What the heights of a band count from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BandFrom {
+    /// The floor that robots stand on: in each column of voxels the top of the voxels that the floor lies in. Of a band
+    /// without bounds it does not matter, and no floor is looked for.
+    #[default]
+    Floor,
+    /// z = 0 of the map, where usually the first scan's sensor was.
+    Map,
+}
+
+impl Keyword for BandFrom {
+    const ALL: &'static [Self] = &[Self::Floor, Self::Map];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Floor => "floor",
+            Self::Map => "map",
+        }
+    }
 }
 
 /// Part of a map, seen from above.
@@ -63,6 +89,22 @@ pub enum GridError {
         min_m: f64,
         /// One past the largest.
         end_m: f64,
+    },
+    /// A band from the floor, of a map that does not know where its sensors were.
+    #[error(
+        "band_from is floor, and the map has neither viewpoints nor a trajectory, below which a floor could be: with \
+         band_from map min_z_m and max_z_m count from z = 0 of the map"
+    )]
+    NoPoses,
+    /// A band from the floor, where none was found.
+    #[error(
+        "band_from is floor, and no floor was found below any of {places} places of the map's sensors, within 5 m: that \
+         is a surface of 4 m² at least that rises by at most 25 %; with band_from map min_z_m and max_z_m count from \
+         z = 0 of the map"
+    )]
+    NoFloor {
+        /// How many places were looked below.
+        places: usize,
     },
     /// A cell that is no whole number of voxels.
     #[error("cell_m must be a whole number of voxels of {voxel_m} m, got {cell_m}")]

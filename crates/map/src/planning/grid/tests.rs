@@ -20,6 +20,7 @@ const REQUEST: GridRequest = GridRequest {
     level: 0,
     area: GridArea::Occupied,
     band_m: [f64::NEG_INFINITY, f64::INFINITY],
+    band_from: BandFrom::Map,
     cell_m: 0.1,
     tells_unknown: false,
     cells_max: 1000,
@@ -77,7 +78,7 @@ proptest! {
         let cell_m = f64::from(cell_voxels) * map.lattice().resolution_m(level);
         let high = std::array::from_fn(|axis| low[axis] + size[axis]);
         let area = GridArea::Rectangle { min_m: low, max_m: high };
-        let request = GridRequest { level, area, band_m, cell_m, tells_unknown: false, cells_max: 1_000_000 };
+        let request = GridRequest { level, area, band_m, band_from: BandFrom::Map, cell_m, tells_unknown: false, cells_max: 1_000_000 };
         let grid = project(&map, &request).unwrap();
         let end = |axis: usize| grid.origin_m[axis] + grid.size[axis] as f64 * cell_m;
         let near = 1e-5 * cell_m;
@@ -113,7 +114,7 @@ proptest! {
         let voxel_m = seen.map.lattice().resolution_m(level);
         let cell_m = f64::from(cell_voxels) * voxel_m;
         let area = GridArea::Rectangle { min_m: low, max_m: std::array::from_fn(|axis| low[axis] + size[axis]) };
-        let request = GridRequest { level, area, band_m, cell_m, tells_unknown: true, cells_max: 1_000_000 };
+        let request = GridRequest { level, area, band_m, band_from: BandFrom::Map, cell_m, tells_unknown: true, cells_max: 1_000_000 };
         let mut view = PausingView::from(seen.map.view().with_viewpoints());
         let grid = project_grid(&mut view, &request, StopSignal::NEVER).unwrap();
         let free = grid.free.as_ref().unwrap();

@@ -247,7 +247,7 @@ proptest! {
     fn a_cell_is_occupied_where_a_voxel_or_a_point_of_a_shape_is(map in map(), low in -20.0..20.0f64, height in 0.5..9.0f64, side in 1u32..4) {
         let area = GridArea::Rectangle { min_m: [-12.0; 2], max_m: [12.0; 2] };
         let cell_m = f64::from(side) * RESOLUTION_M;
-        let request = GridRequest { level: 0, area, band_m: [low, low + height], cell_m, tells_unknown: false, cells_max: 10_000 };
+        let request = GridRequest { level: 0, area, band_m: [low, low + height], band_from: BandFrom::Map, cell_m, tells_unknown: false, cells_max: 10_000 };
         let of_voxels = project_grid(&mut map.view().into(), &request, NEVER).unwrap();
         let told = project_grid(&mut map.view().with_keep_outs().into(), &request, NEVER).unwrap();
         prop_assert_eq!(told.tops_m.iter().map(|top| top.to_bits()).collect::<Vec<_>>(), of_voxels.tops_m.iter().map(|top| top.to_bits()).collect::<Vec<_>>());

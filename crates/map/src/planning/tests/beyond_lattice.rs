@@ -184,8 +184,15 @@ fn points_rays_and_boxes_beyond_the_lattice_are_refused() {
     }
     drop(view);
     let grid = |band_m, area| {
-        let request =
-            GridRequest { level: 0, area, band_m, cell_m: 0.1, tells_unknown: true, cells_max: 1000 };
+        let request = GridRequest {
+            level: 0,
+            area,
+            band_m,
+            band_from: BandFrom::Map,
+            cell_m: 0.1,
+            tells_unknown: true,
+            cells_max: 1000,
+        };
         project_grid(&mut map.view().with_viewpoints().into(), &request, NEVER)
     };
     let area = GridArea::Rectangle { min_m: [0.0; 2], max_m: [1.0; 2] };

@@ -160,6 +160,7 @@ fn a_grid_of_what_was_seen_from_afar_ends_when_it_is_stopped_and_keeps_no_list_o
         level: 0,
         area,
         band_m: [-20.0, 20.0],
+        band_from: BandFrom::Map,
         cell_m: 0.1,
         tells_unknown: true,
         cells_max: 1 << 20,

@@ -1,0 +1,113 @@
+//! Finding the floor: below each pose, and from there on.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use super::height::Floor;
+use super::regions::{Region, Regions, SQUARE_M};
+use super::surfaces::Surfaces;
+use crate::geometry::translation_m;
+use crate::map::{MultiResolutionMap, PausingView};
+use crate::planning::grid::request::{BandFrom, GridError, GridRequest};
+use crate::util::StopSignal;
+
+/// How far from below a pose the floor is looked for, meters. A spinning lidar on the roof of a car first meets the
+/// road some 4 m away, one on a robot the floor at 1 to 3 m.
+const SEARCHED_M: f64 = 5.0;
+/// Most columns that these are: of voxels below 4 cm.
+const SEARCHED_MAX: i32 = 128;
+
+/// The floor that the band of a request counts from; none where it counts from the map's z = 0 or has no bounds.
+///
+/// It is found below the viewpoints of the map, or in a map without any below the poses of its trajectory: there the
+/// surface of the nearest column counts that is highest below the pose, where a region of 4 m² at least spreads from
+/// it. So neither a table below a sensor nor what it sees of its robot is a floor, and of storeys above each other
+/// those are where robots were. Where robots were on two floors above each other, the one counts on which they were
+/// in more places.
+///
+/// Reads all voxels of the level and takes some 70 bytes a surface meanwhile. Others go first between its parts. Once
+/// stopped, the floor lacks parts.
+///
+/// # Errors
+/// Where there is no such pose, or no floor below any.
+pub fn find_floor(
+    view: &mut PausingView<'_>,
+    request: &GridRequest,
+    stop: StopSignal<'_>,
+) -> Result<Option<Arc<Floor>>, GridError> {
+    let is_bounded = request.band_m.iter().any(|c| c.is_finite());
+    if request.band_from == BandFrom::Map || !is_bounded {
+        return Ok(None);
+    }
+    let places_m = places_m(view.view().map());
+    if places_m.is_empty() {
+        return Err(GridError::NoPoses);
+    }
+    let surfaces = Surfaces::of(view, request.level, stop);
+    let voxel_m = view.lattice().resolution_m(request.level);
+    let mut pause = || {
+        view.give_way(stop);
+        !stop.is_stopped()
+    };
+    let mut regions = Regions::new(&surfaces, voxel_m);
+    for place_m in &places_m {
+        if !pause() {
+            break;
+        }
+        visit(*place_m, voxel_m, &surfaces, &mut regions, &mut pause);
+    }
+    let mut floors: Vec<Region> = regions.all;
+    floors.retain(|region| region.visits > 0);
+    if floors.is_empty() && !stop.is_stopped() {
+        return Err(GridError::NoFloor { places: places_m.len() });
+    }
+    floors.sort_by_key(|region| std::cmp::Reverse(region.visits));
+    let tops = floors.iter().flat_map(|region| &region.surfaces);
+    let view = view.view();
+    let columns =
+        tops.map(|surface| (surfaces.voxel(*surface), surfaces.foot(view, request.level, *surface)));
+    Ok(Some(Arc::new(Floor::of(voxel_m, columns, stop))))
+}
+
+/// Where sensors were (map frame, meters), one place of each cube of half a meter: a robot that stands still counts
+/// once.
+fn places_m(map: &MultiResolutionMap) -> Vec<[f64; 3]> {
+    let mut known = HashSet::new();
+    let is_new = |place_m: &[f64; 3]| known.insert(place_m.map(|c| (c / SQUARE_M).floor() as i64));
+    let viewpoints = map.viewpoints();
+    if !viewpoints.is_empty() {
+        let poses = viewpoints.iter().map(|(_, viewpoint)| translation_m(viewpoint.map_from_sensor()));
+        return poses.filter(is_new).collect();
+    }
+    map.trajectory().poses().map(|scan| translation_m(&scan.map_from_sensor)).filter(is_new).collect()
+}
+
+/// Notes the floor below a place.
+fn visit(
+    place_m: [f64; 3],
+    voxel_m: f64,
+    surfaces: &Surfaces,
+    regions: &mut Regions<'_>,
+    pause: &mut impl FnMut() -> bool,
+) {
+    let [x, y, z] = place_m.map(|c| (c / voxel_m).floor() as i32);
+    let searched = ((SEARCHED_M / voxel_m).ceil() as i32).clamp(1, SEARCHED_MAX);
+    for column in (0..=searched).flat_map(|distance| ring([x, y], distance)) {
+        let below = surfaces.of_column(column).take_while(|surface| surfaces.voxel(*surface)[2] < z).last();
+        let Some(surface) = below else { continue };
+        let region = regions.region_of(surface, pause);
+        if regions.all[region].is_floor() {
+            regions.all[region].visits += 1;
+            return;
+        }
+    }
+}
+
+/// The columns on the border of the square that reaches so far from a column.
+fn ring([x, y]: [i32; 2], distance: i32) -> impl Iterator<Item = [i32; 2]> {
+    let rows = (-distance..=distance).flat_map(move |dy| {
+        let step = if dy.abs() == distance { 1 } else { (2 * distance).max(1) };
+        (-distance..=distance).step_by(step as usize).map(move |dx| [dx, dy])
+    });
+    rows.map(move |[dx, dy]| [x.saturating_add(dx), y.saturating_add(dy)])
+}
