@@ -6,6 +6,7 @@ use mrol::console::parse;
 use mrol_map::align::Method;
 use mrol_map::mapping::Guess;
 use mrol_map::scan::{PointFilter, PointFilterError};
+use mrol_map::visibility::SensorModel;
 
 /// Options of the alignment.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -51,11 +52,15 @@ pub(super) struct PointOptions {
     /// Skip points in this box in the sensor frame, the robot itself: "x y z x y z"
     #[arg(long, value_name = "BOX", allow_hyphen_values = true, value_parser = parse::corners)]
     body: Option<([f64; 3], [f64; 3])>,
+    /// How the rays of the sensor lie, so that it is not found out scan by scan: "spinning RINGS COLUMNS LOWEST_DEG
+    /// HIGHEST_DEG" or "pinhole WIDTH HEIGHT FX FY"
+    #[arg(long, value_name = "MODEL")]
+    sensor: Option<SensorModel>,
 }
 
 impl PointOptions {
     pub(super) fn filter(&self) -> Result<PointFilter, PointFilterError> {
-        let Self { range_min, range_max, body } = self;
+        let Self { range_min, range_max, body, sensor: _ } = self;
         let filter = PointFilter {
             range_min_m: *range_min,
             range_max_m: *range_max,
@@ -63,5 +68,10 @@ impl PointOptions {
             ..PointFilter::default()
         };
         filter.checked()
+    }
+
+    /// How the rays of the sensor lie, where it is said.
+    pub(super) fn sensor(&self) -> Option<SensorModel> {
+        self.sensor
     }
 }

@@ -161,6 +161,11 @@ mod tests {
         assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
         let margin = error("[robots.r]\ncarve = true\ncarve_margin_voxels = 9");
         assert!(margin.contains("robots.r: carve_margin_voxels must be 1 to 8, got 9"), "{margin}");
+        let sensor = error("[robots.r]\nsensor = \"spinning 0 1800 -24.9 2\"");
+        assert!(
+            sensor.contains("rings must lie in 1..=1024, got 0") && sensor.contains("sensor"),
+            "{sensor}"
+        );
         let threads = error("[threads]\nmapping = 1025");
         assert!(threads.contains("threads.mapping must be 0 to 1024, got 1025"), "{threads}");
         assert!(

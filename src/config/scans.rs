@@ -1,12 +1,13 @@
 //! Sections `alignment` and `robots` of the settings.
 
-use crate::json::ByKeyword;
+use crate::json::{ByKeyword, ByText};
 use mrol_map::align::Method;
 use mrol_map::mapping::{
     CarvingSettings, ODOMETRY_SHARE_MAX, OdometrySettings, SENSOR_HEIGHT_MAX_M, SensorAxes, SensorMount,
 };
 use mrol_map::scan::PointFilter;
 use mrol_map::util::Keyword;
+use mrol_map::visibility::SensorModel;
 use mrol_service::{RobotSettings, SettingKind, SettingValue, section};
 
 section! {
@@ -53,6 +54,9 @@ section! {
         odometry_way_share: f64 = OdometrySettings::default().way_share; none, from 0, to ODOMETRY_SHARE_MAX;
         /// Standard deviation of its turn, as a share of it.
         odometry_turn_share: f64 = OdometrySettings::default().turn_share; none, from 0, to ODOMETRY_SHARE_MAX;
+        /// How the rays of its sensor lie, `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
+        /// FY`. Otherwise it is found out from the points of each scan.
+        sensor: Option<ByText<SensorModel>> = None; none;
     }
 }
 
@@ -64,6 +68,10 @@ impl<T: Keyword> SettingValue for ByKeyword<T> {
     }
 }
 
+impl<T> SettingValue for ByText<T> {
+    const KIND: SettingKind = SettingKind::Text;
+}
+
 impl RobotConfig {
     pub(super) fn of_robot(&self) -> RobotSettings {
         RobotSettings {
@@ -73,6 +81,7 @@ impl RobotConfig {
             carving: self.carving(),
             odometry: self.odometry(),
             mount: SensorMount { axes: self.axes.0, height_m: self.sensor_height_m },
+            sensor: self.sensor.map(|model| model.0),
         }
     }
 

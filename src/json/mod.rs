@@ -10,6 +10,7 @@ mod map;
 mod observers;
 mod pose;
 mod scan;
+mod text;
 mod vectors;
 mod version;
 
@@ -25,6 +26,7 @@ pub use self::map::{
 pub use self::observers::{JsonObservers, JsonObservingScan};
 pub use self::pose::JsonPose;
 pub use self::scan::{JsonDirection, JsonScan};
+pub use self::text::ByText;
 pub use self::vectors::{
     Corners3, PoseMatrix, PoseNumbers, PoseVector, Quaternion, Sizes2, Sphere, Vector2, Vector3, VoxelIndex,
 };

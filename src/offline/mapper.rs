@@ -11,6 +11,7 @@ use mrol_map::mapping::{
     SensorMount, Sightings,
 };
 use mrol_map::util::StopSignal;
+use mrol_map::visibility::{SensorModel, SensorRays};
 
 /// Name of the robot in the map's trajectory.
 const ROBOT: &str = "mrol";
@@ -24,6 +25,7 @@ pub struct Mapper {
     sightings: Sightings,
     lost: LostRobots,
     recovers: bool,
+    sensor: Option<SensorModel>,
 }
 
 /// Result of mapping a scan.
@@ -68,6 +70,7 @@ impl Mapper {
             sightings: Sightings::default(),
             lost: LostRobots::default(),
             recovers: false,
+            sensor: None,
         })
     }
 
@@ -82,6 +85,12 @@ impl Mapper {
     pub fn mounted(mut self, mount: SensorMount) -> Self {
         self.settings.mount = mount;
         self
+    }
+
+    /// This mapper, of scans of a sensor that is known, or of an unknown one.
+    #[must_use]
+    pub fn with_sensor(self, sensor: Option<SensorModel>) -> Self {
+        Self { sensor, ..self }
     }
 
     /// The map so far.
@@ -100,7 +109,9 @@ impl Mapper {
     /// When no point of it lies within the map's range.
     pub fn add(&mut self, k: usize, points: &[Point], known: Option<Pose>) -> Result<Mapped, MappingError> {
         let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
+        let sensor = self.sensor.map(|model| SensorRays::confirmed(&model, points));
         let scan = Scan {
+            sensor: sensor.and_then(Result::ok),
             scan_id: Some(k as u64),
             guess: known.map_or(self.guess, Guess::Pose),
             at_guess: known.is_some(),
@@ -110,7 +121,11 @@ impl Mapper {
         if self.recovers {
             mapper = mapper.recovering(&self.lost, RecoverySettings::default());
         }
-        let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
+        let mut outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
+        if let Some(mismatch) = sensor.and_then(Result::err) {
+            let reason = &mut outcome.located.alignment.reason;
+            *reason = format!("{reason}; {mismatch}");
+        }
         let from_points = self.map.lattice().from_points(&outcome.located.alignment.map_from_sensor);
         Ok(Mapped {
             beyond_map: points.iter().filter(|&&point| from_points.index(point).is_none()).count(),

@@ -23,6 +23,7 @@ mod questions;
 mod recovery;
 mod regions;
 mod scan_requests;
+mod sensors;
 mod sessions;
 #[path = "../support/mod.rs"]
 mod support;

@@ -28,6 +28,19 @@ fn files_that_are_no_scans_are_named() {
 }
 
 #[test]
+fn what_is_no_sensor_model_is_refused_with_the_limit() {
+    let (_folder, path) = file("scan.xyz", b"1 1 1\n");
+    let said = complaint(&["map", &path, "--resolution", "0.1", "--sensor", "spinning 2000 1800 -24.9 2"], 2);
+    assert!(said.contains("rings must lie in 1..=1024, got 2000"), "{said}");
+    let said = complaint(&["insert", &path, "--map", "a", "--sensor", "lidar"], 2);
+    assert!(said.contains("a sensor model must be") && said.contains("got \"lidar\""), "{said}");
+    let other = ["map", &path, "--resolution", "0.1", "--sensor", "spinning 64 1800 -24.9 2"];
+    let mapped = super::objects(&other);
+    let reason = mapped[0]["reason"].as_str().unwrap();
+    assert!(reason.contains("its sensor model \"spinning 64 1800 -24.9 2\" is not used"), "{reason}");
+}
+
+#[test]
 fn a_scan_of_nothing_but_no_returns_is_named() {
     let (_folder, path) = file("scan.xyz", b"nan nan nan\nnan 0 0\n");
     assert!(

@@ -15,6 +15,7 @@ use mrol_client::service::{
     ScanRequest, ServiceError, ServiceSettings, TimeReference,
 };
 use mrol_client::util::Keyword;
+use mrol_client::visibility::SensorModelError;
 use mrol_store::OpeningProgress;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -55,6 +56,7 @@ struct ScanFields<'py> {
     range_min_m: Option<f64>,
     range_max_m: Option<f64>,
     body_m: Option<([f64; 3], [f64; 3])>,
+    sensor: Option<String>,
     strict: bool,
     foreground_level: Option<u32>,
 }
@@ -97,6 +99,10 @@ impl ScanFields<'_> {
                 body_m: self.body_m,
                 keep_zeros: false,
                 beyond_range_is_noise: false,
+            },
+            sensor: match self.sensor {
+                Some(text) => Some(text.parse().map_err(|error: SensorModelError| bad(error.to_string()))?),
+                None => None,
             },
             strict: self.strict,
             ..ScanRequest::new(robot, points_of(points))

@@ -151,6 +151,7 @@ EYE = np.eye(4)
         ("gravity_in_sensor", lambda m: m.insert(POINTS, gravity_in_sensor=[0, 0])),
         ("range_min_m", lambda m: m.insert(POINTS, range_min_m=np.nan)),
         ("body_m", lambda m: m.insert(POINTS, body_m=[1, 2, 3])),
+        ("sensor", lambda m: m.insert(POINTS, sensor=64)),
         ("gravity_in_map", lambda m: m.localize(POINTS, gravity_in_map=[0, 0, 1])),
         ("candidates", lambda m: m.localize(POINTS, candidates=0)),
         ("body.links[0].spheres", lambda m: m.check_poses([[1, 2, 3]], EYE)),

@@ -61,9 +61,11 @@ def test_every_option_of_a_scan_reaches_the_server(hall: mrol.Map) -> None:
         range_min_m=0.2,
         range_max_m=20,
         body_m=[[-0.3, -0.3, -0.3], [0.3, 0.3, 0.3]],
+        sensor="spinning 2 4 -10 10",
         strict=True,
     )
     assert answer.accepted
+    assert 'sensor model "spinning 2 4 -10 10" is not used' in answer.reason
     scan = hall.trajectory().scans[-1]
     assert scan.timestamp_ns == 1_700_000_000_000_000_000
     moved = hall.align(room((0.3, 0, 0), seed=6), motion=[0.2, 0, 0, 0, 0, 0, 1])

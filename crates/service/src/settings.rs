@@ -14,6 +14,7 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::map::RobotName;
 use mrol_map::mapping::{CarvingSettings, OdometrySettings, SensorMount, StationarySettings};
 use mrol_map::scan::PointFilter;
+use mrol_map::visibility::SensorModel;
 use mrol_store::StoreSettings;
 
 /// Settings of a [`MapService`](crate::MapService).
@@ -68,6 +69,8 @@ pub struct RobotSettings {
     pub odometry: OdometrySettings,
     /// How its sensor is mounted.
     pub mount: SensorMount,
+    /// How the rays of its sensor lie; of an unknown one it is found out scan by scan.
+    pub sensor: Option<SensorModel>,
 }
 
 /// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.

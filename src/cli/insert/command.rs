@@ -122,6 +122,7 @@ impl Insert {
             next: self.next_guess.into(),
             method: self.alignment.method(),
             filter: self.points.filter().map_err(CliError::usage)?,
+            sensor: self.points.sensor(),
             force: self.force,
             recover: self.recover,
             carve: self.carve,

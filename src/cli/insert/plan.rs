@@ -10,6 +10,7 @@ use mrol_map::geometry::Pose;
 use mrol_map::map::{RobotName, SessionName};
 use mrol_map::mapping::Guess;
 use mrol_map::scan::PointFilter;
+use mrol_map::visibility::SensorModel;
 use mrol_service::ScanRequest;
 
 /// How the scans of the files are sent.
@@ -27,6 +28,7 @@ pub(super) struct Plan {
     pub(super) next: Guess,
     pub(super) method: Option<Method>,
     pub(super) filter: PointFilter,
+    pub(super) sensor: Option<SensorModel>,
     pub(super) force: bool,
     pub(super) recover: Option<bool>,
     pub(super) carve: Option<bool>,
@@ -53,6 +55,7 @@ impl Plan {
                 carve: self.carve,
                 method: self.method,
                 filter: self.filter,
+                sensor: self.sensor,
                 ..ScanRequest::new(self.robot.clone(), self.survey.read(file)?.into())
             };
             if sender.blocking_send(scan).is_err() {

@@ -145,7 +145,8 @@ impl Map {
         let (survey, origin) = self.survey(&files, &output)?;
         let settings = MapSettings { origin, ..self.map_settings() };
         let mapper = Mapper::new(settings, alignment, self.guess.into())?;
-        let mut mapper = mapper.recovering(!self.no_recovery).mounted(self.mount());
+        let mapper = mapper.recovering(!self.no_recovery).mounted(self.mount());
+        let mut mapper = mapper.with_sensor(self.points.sensor());
         if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
             output.note(format!("origin of the map: {x} {y} {z}"));
         }

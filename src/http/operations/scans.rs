@@ -21,6 +21,7 @@ use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{RobotName, SessionName};
 use mrol_map::mapping::Guess;
 use mrol_map::scan::PointFilter;
+use mrol_map::visibility::SensorModel;
 use mrol_service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
 
 /// Numbers of a covariance of a pose.
@@ -96,6 +97,9 @@ pub(crate) struct ScanBody {
     /// meters, in the sensor frame.
     #[schema(value_type = Option<Corners3>)]
     body_m: Option<[[f64; 3]; 2]>,
+    /// How the rays of its sensor lie: `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
+    /// FY`; the robot's setting without.
+    sensor: Option<String>,
     /// Whether points that are not finite are an error; false without: they are skipped.
     #[serde(default)]
     strict: bool,
@@ -166,6 +170,9 @@ pub(crate) struct ScanParams {
     /// Points in this box are of the robot itself, and skipped: `x,y,z,x,y,z`, meters, in the sensor frame.
     #[param(value_type = Option<Numbers6>, inline)]
     body_m: Option<String>,
+    /// How the rays of its sensor lie: `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
+    /// FY`; the robot's setting without.
+    sensor: Option<String>,
     /// Whether points that are not finite are an error; false without: they are skipped.
     #[serde(default)]
     strict: bool,
@@ -248,6 +255,7 @@ impl TryFrom<ScanBody> for ScanRequest {
                 body_m: scan.body_m.map(|[min_m, max_m]| (min_m, max_m)),
                 ..PointFilter::default()
             },
+            sensor: sensor_of(scan.sensor)?,
             strict: scan.strict,
             ..Self::new(RobotName::new(&scan.robot)?, scan.points.into())
         })
@@ -291,6 +299,7 @@ impl ScanParams {
                 body_m: self.body_m.map(|text| corners(&text)).transpose()?,
                 ..PointFilter::default()
             },
+            sensor: sensor_of(self.sensor)?,
             strict: self.strict,
             ..ScanRequest::new(RobotName::new(&self.robot)?, points)
         })
@@ -320,6 +329,11 @@ fn reference(from_sweep_start: bool) -> TimeReference {
 fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), ServiceError> {
     let [x0, y0, z0, x1, y1, z1] = params::numbers(text, "body_m")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
+}
+
+/// The model of a sensor, where there is a text.
+fn sensor_of(text: Option<String>) -> Result<Option<SensorModel>, ServiceError> {
+    text.map(|text| text.parse::<SensorModel>()).transpose().in_field("sensor")
 }
 
 fn guess_of(

@@ -11,6 +11,7 @@ use mrol_map::align::{Direction, Method, PoseCovariance, Rival, Verdict};
 use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_map::mapping::{Guess, Recovered};
 use mrol_map::scan::PointFilter;
+use mrol_map::visibility::SensorModel;
 use mrol_service::{Foreground, PointTimes, Reason, ScanAnswer, ScanRequest, ServiceError, TimeReference};
 
 impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
@@ -54,6 +55,7 @@ fn scan_from(
         at_guess,
         method: method_from(method)?,
         filter,
+        sensor: sensor_from(&scan.sensor)?,
         strict: scan.strict,
         ..ScanRequest::new(
             RobotName::new(&scan.robot).in_field("scan.robot")?,
@@ -89,6 +91,12 @@ fn filter_from(scan: &pb::Scan) -> Result<PointFilter, ServiceError> {
         body_m: scan.body.as_ref().map(body).transpose()?,
         ..PointFilter::default()
     })
+}
+
+/// The model of a sensor; none where there is no text.
+fn sensor_from(text: &str) -> Result<Option<SensorModel>, ServiceError> {
+    let model = (!text.is_empty()).then(|| text.parse::<SensorModel>());
+    model.transpose().in_field("scan.sensor")
 }
 
 fn method_from(number: i32) -> Result<Option<Method>, ServiceError> {
@@ -188,6 +196,7 @@ impl From<ScanRequest> for pb::Scan {
             range_min_m: scan.filter.range_min_m,
             range_max_m: scan.filter.range_max_m,
             body: scan.filter.body_m.map(body),
+            sensor: scan.sensor.map(|model| model.to_string()).unwrap_or_default(),
         }
     }
 }

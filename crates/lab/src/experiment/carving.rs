@@ -14,6 +14,7 @@ use mrol_map::mapping::{
     CarvingSettings, Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings, ViewpointSettings,
 };
 use mrol_map::util::StopSignal;
+use mrol_map::visibility::{SensorModel, SensorRays};
 use mrol_map::voxel::VoxelKey;
 use mrol_simulate::{Mover, Scene, SpinningLidar};
 
@@ -41,6 +42,8 @@ pub struct CarvingTrial {
     pub resolution_m: f64,
     /// The robot's sensor.
     pub lidar: SpinningLidar,
+    /// The model of the sensor that the scans are mapped with; none: as those of an unknown one.
+    pub sensor: Option<SensorModel>,
     /// What the scans carve.
     pub carving: CarvingSettings,
     /// Take the scans at their true poses, without aligning them.
@@ -193,7 +196,8 @@ impl CarvingTrial {
     }
 
     fn map(&self, carving: Option<CarvingSettings>) -> Result<CarvingMapper, CarvingTrialError> {
-        CarvingMapper::new(MapSettings::new(self.resolution_m, LEVELS), carving, self.at_true_poses)
+        let settings = MapSettings::new(self.resolution_m, LEVELS);
+        CarvingMapper::new(settings, carving, self.at_true_poses, self.sensor)
     }
 }
 
@@ -227,6 +231,7 @@ pub struct CarvingMapper {
     sightings: Sightings,
     settings: MappingSettings,
     at_true_poses: bool,
+    sensor: Option<SensorModel>,
     /// Carve by these in the place of the scan's surface.
     pub exact: Option<ExactRays>,
     /// Errors of the accepted scans' poses, meters.
@@ -238,7 +243,8 @@ pub struct CarvingMapper {
 }
 
 impl CarvingMapper {
-    /// An empty map of these settings, whose scans carve it as `carving` says.
+    /// An empty map of these settings, whose scans carve it as `carving` says; they are those of a known sensor, or of
+    /// an unknown one.
     ///
     /// # Errors
     /// When a setting is out of range.
@@ -246,6 +252,7 @@ impl CarvingMapper {
         settings: MapSettings,
         carving: Option<CarvingSettings>,
         at_true_poses: bool,
+        sensor: Option<SensorModel>,
     ) -> Result<Self, CarvingTrialError> {
         Ok(Self {
             map: MultiResolutionMap::new(settings)?,
@@ -260,6 +267,7 @@ impl CarvingMapper {
                 ..MappingSettings::default()
             },
             at_true_poses,
+            sensor,
             exact: None,
             errors_m: Vec::new(),
             carve_times: Vec::new(),
@@ -275,6 +283,7 @@ impl CarvingMapper {
     pub fn add(&mut self, step: usize, points: &[Point], truth: &Pose) -> Result<bool, CarvingTrialError> {
         let is_given = self.at_true_poses || step == 0;
         let scan = Scan {
+            sensor: self.sensor.and_then(|model| SensorRays::confirmed(&model, points).ok()),
             guess: if is_given { Guess::Pose(*truth) } else { Guess::ConstantVelocity },
             at_guess: is_given,
             ..Scan::new(&self.robot, points)
@@ -337,6 +346,7 @@ mod tests {
             scans_a_round: 50,
             resolution_m: 0.1,
             lidar,
+            sensor: None,
             carving: CarvingSettings::default(),
             at_true_poses: true,
             seed: 1,

@@ -15,6 +15,7 @@ use mrol_map::geometry::Pose;
 use mrol_map::map::{MapView, MultiResolutionMap, RobotName};
 use mrol_map::mapping::{Guess, MappingError, MappingSettings, Scan as ScanToMap, ScanMapper, Sightings};
 use mrol_map::util::StopSignal;
+use mrol_map::visibility::{SensorModel, SensorRays};
 use mrol_map::voxel::VoxelKey;
 
 /// The first bytes of a file of scans.
@@ -108,7 +109,7 @@ impl PeerStates {
     }
 }
 
-/// Maps scans at their poses, as a robot's that knows them.
+/// Maps scans at their poses, as a robot's that knows them; of a known sensor, or of an unknown one.
 ///
 /// # Errors
 /// For a scan without a point within the map's range.
@@ -116,13 +117,14 @@ pub fn map_at_poses(
     map: &MultiResolutionMap,
     scans: &[(&Scan, Pose)],
     settings: MappingSettings,
-    robot: &RobotName,
+    (robot, sensor): (&RobotName, Option<SensorModel>),
     step: impl Fn(),
 ) -> Result<(), MappingError> {
     let sightings = Sightings::default();
     let mapper = ScanMapper::new(map, &sightings, settings);
     for (scan, map_from_sensor) in scans {
         let scan = ScanToMap {
+            sensor: sensor.and_then(|model| SensorRays::confirmed(&model, &scan.points).ok()),
             guess: Guess::Pose(*map_from_sensor),
             at_guess: true,
             ..ScanToMap::new(robot, &scan.points)

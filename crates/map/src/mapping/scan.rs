@@ -8,6 +8,7 @@ use crate::align::PoseCovariance;
 use crate::align::localize::Gravity;
 use crate::geometry::{Point, Twist};
 use crate::map::{RobotName, SessionName};
+use crate::visibility::SensorRays;
 
 /// A scan to map.
 #[derive(Debug, Clone)]
@@ -31,6 +32,9 @@ pub struct Scan<'a> {
     pub beyond: RayEnds<'a>,
     /// Where rays ended at the robot itself: no voxels, and what lies behind them was not seen.
     pub of_robot: RayEnds<'a>,
+    /// How the sensor's rays lie, where the robot's sensor is known and all the scan's ends [confirm
+    /// it](SensorRays::confirmed); none: how densely they lie is found out from the points.
+    pub sensor: Option<SensorRays>,
     /// Points that were left out before, see [`FilteredPoints`](super::FilteredPoints).
     pub points_skipped: usize,
     /// Direction of gravity, as an accelerometer tells.
@@ -85,6 +89,7 @@ impl<'a> Scan<'a> {
             no_returns: RayEnds::default(),
             beyond: RayEnds::default(),
             of_robot: RayEnds::default(),
+            sensor: None,
             points_skipped: 0,
             gravity: None,
             guess: Guess::Last,

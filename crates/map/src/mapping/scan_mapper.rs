@@ -213,7 +213,8 @@ impl<'a> ScanMapper<'a> {
         let is_needed = located.is_first || from_guess_m > FAR_M;
         let is_stationary = self.is_stationary(scan, map_from_sensor);
         let (points, beyond) = (&points, &beyond);
-        let seen = SeenScan { points, beyond, map_from_sensor, moved_m, is_needed, is_stationary };
+        let sensor = scan.sensor;
+        let seen = SeenScan { points, beyond, map_from_sensor, moved_m, is_needed, is_stationary, sensor };
         record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
@@ -265,7 +266,8 @@ impl<'a> ScanMapper<'a> {
         let met = self.met(scan, record, velocity);
         let (beyond, no_returns) = (scan.beyond.at(velocity), scan.no_returns.at(velocity));
         let rays = ScanRays { met: &met, beyond: &beyond, no_returns: &no_returns };
-        CarvingScan { rays, record, moved_m: scan.moved_m(velocity) }.carve(self.map, &settings, stop)
+        let carving = CarvingScan { rays, record, moved_m: scan.moved_m(velocity), sensor: scan.sensor };
+        carving.carve(self.map, &settings, stop)
     }
 
     /// True of a scan that shows again what its robot's last one showed, from where that was taken, carves nothing, and

@@ -10,8 +10,8 @@ use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
 use crate::util::StopSignal;
 use crate::visibility::{
-    IMAGE_BYTES_MAX, RangeImage, Sweep, Thresholds, Viewpoint, ViewpointSet, newly_seen_by_rays_m3,
-    newly_seen_m3,
+    IMAGE_BYTES_MAX, RangeImage, SensorRays, Sweep, Thresholds, Viewpoint, ViewpointSet,
+    newly_seen_by_rays_m3, newly_seen_m3,
 };
 
 /// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
@@ -86,6 +86,8 @@ pub(super) struct SeenScan<'a> {
     pub(super) is_needed: bool,
     /// Its robot's last one was taken there, too.
     pub(super) is_stationary: bool,
+    /// How its rays lie, where the sensor is known.
+    pub(super) sensor: Option<SensorRays>,
 }
 
 impl ViewpointSettings {
@@ -117,7 +119,7 @@ impl ViewpointSettings {
         if !least.may_be_seen_by(&ends, sweep, map_from_sensor, viewpoints) {
             return None;
         }
-        let image = RangeImage::of_points_by(&ends, sweep, IMAGE_BYTES_MAX, &self.thresholds)?;
+        let image = RangeImage::of_points_by(&ends, sweep, IMAGE_BYTES_MAX, scan.sensor, &self.thresholds)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown =
             share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.is_free(point));
@@ -290,6 +292,7 @@ mod tests {
             moved_m: 0.0,
             is_needed: false,
             is_stationary: false,
+            sensor: None,
         }
     }
 

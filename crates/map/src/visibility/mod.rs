@@ -31,7 +31,7 @@ mod thresholds;
 
 pub use absence::{RayWindow, ScanSurface, SurfaceSettings};
 pub use image::{AbsenceEvidence, IMAGE_BYTES_MAX, Met, RangeImage, RangeImageError, Sight};
-pub use imaging::{ScanImage, ScanRays, Sweep};
+pub use imaging::{ScanImage, ScanRays, SensorMismatch, SensorModel, SensorModelError, SensorRays, Sweep};
 pub use set::{VIEWPOINT_MEMORY_MAX, Viewpoint, ViewpointCache, ViewpointSet};
 pub use set::{newly_seen_by_rays_m3, newly_seen_m3};
 pub use thresholds::Thresholds;

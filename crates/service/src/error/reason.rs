@@ -79,6 +79,7 @@ reasons! {
         BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
+        BadSensor "bad_sensor" Both: "a scan's `sensor` is no sensor model, or a number of it is out of range", "the message names which; or leave it out";
         BadGrid "bad_grid" Both: "a grid's rectangle or band is in the wrong order or not finite, or a cell is no whole number of voxels", "correct it";
         BadGuess "bad_guess" Grpc: "`constant_velocity` is false", "leave the guess out";
         BadGravity "bad_gravity" Both: "a scan's `gravity_in_sensor` is zero or not finite", "send the direction in which things fall, in the sensor frame; an accelerometer at rest reads the opposite";

@@ -15,6 +15,7 @@ use mrol_map::geometry::Pose;
 use mrol_map::map::{RobotName, SessionName};
 use mrol_map::mapping::{Guess, Recovered};
 use mrol_map::scan::PointFilter;
+use mrol_map::visibility::SensorModel;
 
 /// A scan to align or insert.
 #[derive(Debug, Clone)]
@@ -51,6 +52,8 @@ pub struct ScanRequest {
     pub foreground_level: Option<u32>,
     /// Which points count, before what the server is set to for this robot.
     pub filter: PointFilter,
+    /// How the rays of its sensor lie; where none, as the server is set for this robot.
+    pub sensor: Option<SensorModel>,
     /// Refuse the scan instead of skipping points that are not finite.
     pub strict: bool,
 }
@@ -104,6 +107,7 @@ impl ScanRequest {
             method: None,
             foreground_level: None,
             filter: PointFilter::default(),
+            sensor: None,
             strict: false,
         }
     }

@@ -7,6 +7,7 @@ use mrol_map::align::PoseCovarianceError;
 use mrol_map::geometry::{Point, rotation_xyzw, translation_m};
 use mrol_map::mapping::{FilteredPoints, Guess, MappingError, RayEnds, Scan};
 use mrol_map::scan::SkippedPoints;
+use mrol_map::visibility::{SensorMismatch, SensorModel, SensorModelError, SensorRays};
 use mrol_map::voxel::LatticeFromPoints;
 
 /// A scan request with the points of the robot's surroundings.
@@ -15,6 +16,8 @@ pub(super) struct FilteredScan<'a> {
     filtered: FilteredPoints,
     /// When each of the request's points was measured; not a number of those that do not count.
     pub(super) times: Option<PointTimes>,
+    /// How the sensor's rays lie, or why its model is not used; none of an unknown sensor.
+    sensor: Option<Result<SensorRays, SensorMismatch>>,
     /// The digest of the request.
     pub(super) digest: u64,
 }
@@ -25,7 +28,8 @@ impl<'a> FilteredScan<'a> {
     /// # Errors
     /// When no point is left, one had to be left out of a strict request, or a time of a point that counts is none.
     pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
-        let filter = request.filter.or(settings.of_robot(&request.robot).filter);
+        let robot = settings.of_robot(&request.robot);
+        let filter = request.filter.or(robot.filter);
         let (points, most_s) = (request.points.as_slice(), settings.limits.point_times_max_s);
         let counts = |i: usize| filter.keeps(points[i]);
         let times = request
@@ -36,7 +40,14 @@ impl<'a> FilteredScan<'a> {
         let ends = RayEnds { points, times_s: times.as_ref().map(PointTimes::as_slice) };
         let filtered = FilteredPoints::of(ends, filter, &request.robot, request.strict)?;
         let digest = digest(request, times.as_ref());
-        Ok(Self { request, filtered, times, digest })
+        let model = request.sensor.or(robot.sensor).map(SensorModel::checked).transpose()?;
+        let sensor = model.map(|model| SensorRays::confirmed(&model, points));
+        Ok(Self { request, filtered, times, sensor, digest })
+    }
+
+    /// Why the model of the scan's sensor is not used, where there is one that is not.
+    pub(super) fn sensor_mismatch(&self) -> Option<SensorMismatch> {
+        self.sensor.and_then(Result::err)
     }
 
     /// The scan as the core maps it.
@@ -52,6 +63,7 @@ impl<'a> FilteredScan<'a> {
             no_returns: self.filtered.no_returns(),
             beyond: self.filtered.beyond(),
             of_robot: self.filtered.of_robot(),
+            sensor: self.sensor.and_then(Result::ok),
             points_skipped: self.filtered.skipped.total(),
             gravity: self.request.gravity,
             guess: self.request.guess,
@@ -78,6 +90,12 @@ impl<'a> FilteredScan<'a> {
 impl From<PoseCovarianceError> for ServiceError {
     fn from(error: PoseCovarianceError) -> Self {
         Self::new(Reason::BadCovariance, error.to_string())
+    }
+}
+
+impl From<SensorModelError> for ServiceError {
+    fn from(error: SensorModelError) -> Self {
+        Self::new(Reason::BadSensor, error.to_string())
     }
 }
 

@@ -270,10 +270,12 @@ impl HostedMap {
     fn answer(&self, scan: &FilteredScan<'_>, located: &LocatedScan) -> ScanAnswer {
         let alignment = &located.alignment;
         let skipped = scan.skipped(&self.map.lattice().from_points(&alignment.map_from_sensor));
+        let accepted = alignment.verdict == Verdict::Accepted;
+        let reason = skipped.explain(accepted, &alignment.reason);
         ScanAnswer {
-            accepted: alignment.verdict == Verdict::Accepted,
+            accepted,
             verdict: alignment.verdict,
-            reason: skipped.explain(alignment.verdict == Verdict::Accepted, &alignment.reason),
+            reason: scan.sensor_mismatch().map_or(reason.clone(), |mismatch| format!("{reason}; {mismatch}")),
             map_from_sensor: alignment.map_from_sensor,
             level_overlaps: alignment.level_overlaps.clone(),
             inliers: alignment.inliers,

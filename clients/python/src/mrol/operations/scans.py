@@ -154,6 +154,7 @@ class ScanOperations(MapHandle):
         range_min_m: float | None = None,
         range_max_m: float | None = None,
         body_m: BoxLike | None = None,
+        sensor: str | None = None,
         strict: bool = False,
     ) -> ScanAnswer:
         """Aligns a scan and, where it fits, adds it to the map: once, however often it has to be sent.
@@ -162,6 +163,7 @@ class ScanOperations(MapHandle):
         thought to have been taken (`map_from_sensor`), `motion` how far from the robot's last accepted pose (`last_from_sensor`);
         without either it is that pose. `align=False` adds the scan at its guess. `timestamp_ns` counts from 1970. `point_times`
         (shape (n,), seconds from `timestamp_ns`) undo the sensor's motion during its sweep. `guess_covariance` has shape (6, 6).
+        `sensor` says how the rays of the sensor lie, "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or "pinhole WIDTH HEIGHT FX FY".
 
         Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on.
         After an error with `repeat_with` (`ConnectionLost`, `TimedOut`, ...) it is not known whether the scan is in the map: send
@@ -179,7 +181,7 @@ class ScanOperations(MapHandle):
             "force": flag_of(force, "force"),
             **_guesses(guess, motion, constant_velocity, align),
             **_knowledge(timestamp_ns, gravity_in_sensor, guess_covariance),
-            **_treatment(method, range_min_m, range_max_m, body_m, strict),
+            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict),
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         # Last, so that a scan which is refused here uses no id up.
@@ -210,6 +212,7 @@ class ScanOperations(MapHandle):
         range_min_m: float | None = None,
         range_max_m: float | None = None,
         body_m: BoxLike | None = None,
+        sensor: str | None = None,
         strict: bool = False,
         foreground_level: int | None = None,
     ) -> ScanAnswer:
@@ -224,7 +227,7 @@ class ScanOperations(MapHandle):
             "foreground_level": None if foreground_level is None else level_of(foreground_level, "foreground_level"),
             **_guesses(guess, motion, constant_velocity, True),
             **_knowledge(timestamp_ns, gravity_in_sensor, guess_covariance),
-            **_treatment(method, range_min_m, range_max_m, body_m, strict),
+            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict),
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         answer = self._send_bytes("alignment", pieces, parameters)
@@ -285,7 +288,12 @@ def _covariance_text(covariance: ArrayLike) -> str:
 
 
 def _treatment(
-    method: Method | None, range_min_m: float | None, range_max_m: float | None, body_m: BoxLike | None, strict: bool
+    method: Method | None,
+    range_min_m: float | None,
+    range_max_m: float | None,
+    body_m: BoxLike | None,
+    sensor: str | None,
+    strict: bool,
 ) -> dict[str, Parameter]:
     corners = None if body_m is None else Box.of(body_m, "body_m").corners("body_m")
     return {
@@ -293,6 +301,7 @@ def _treatment(
         "range_min_m": None if range_min_m is None else number_of(range_min_m, "range_min_m"),
         "range_max_m": None if range_max_m is None else number_of(range_max_m, "range_max_m"),
         "body_m": None if corners is None else numbers_text([*corners[0], *corners[1]]),
+        "sensor": None if sensor is None else text_of(sensor, "sensor"),
         "strict": flag_of(strict, "strict"),
     }
 

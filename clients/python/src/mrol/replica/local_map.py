@@ -98,6 +98,7 @@ class LocalMap(InProcessMap):
         range_min_m: "float | None" = None,
         range_max_m: "float | None" = None,
         body_m: "BoxLike | None" = None,
+        sensor: "str | None" = None,
         strict: bool = False,
     ) -> ScanAnswer:
         """Aligns a scan and adds it where it fits: see `mrol.Map.insert`. A scan that does not fit is an answer."""
@@ -121,6 +122,7 @@ class LocalMap(InProcessMap):
         range_min_m: "float | None" = None,
         range_max_m: "float | None" = None,
         body_m: "BoxLike | None" = None,
+        sensor: "str | None" = None,
         strict: bool = False,
         foreground_level: "int | None" = None,
     ) -> ScanAnswer:
@@ -256,6 +258,7 @@ TAKEN_AS: "dict[str, Callable[[Any, str], Any]]" = {
     "range_min_m": number_of,
     "range_max_m": number_of,
     "body_m": lambda value, name: Box.of(value, name).corners(name),
+    "sensor": text_of,
     "strict": flag_of,
     "foreground_level": lambda value, name: whole_of(value, name, 0, (1 << 32) - 1),
 }

@@ -18,13 +18,14 @@ use mrol::console::{PlanLayer, plan};
 use mrol_map::map::{LEVELS_DEFAULT, MapSettings};
 use mrol_map::mapping::CarvingSettings;
 use mrol_map::scan::{read_points, scan_files};
-use mrol_map::visibility::Thresholds;
+use mrol_map::visibility::{SensorModel, Thresholds};
 use mrol_map::voxel::VoxelKey;
 use mrol_simulate::SpinningLidar;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol-lab experiment carving
+  mrol-lab experiment carving --sensor \"spinning 64 1024 -21.65625 21.65625\"      the simulated lidar, as a known sensor
   mrol-lab experiment carving --scans street/ --resolution 0.2 --out results/
   mrol-lab experiment carving --sensitivity --count 60                            does it matter what each threshold is?
 
@@ -58,6 +59,9 @@ pub(super) struct Carving {
     /// Voxels farther away are not carved
     #[arg(long, value_name = "METERS", default_value_t = CarvingSettings::default().range_max_m)]
     range: f64,
+    /// How the rays of the sensor lie: "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or "pinhole WIDTH HEIGHT FX FY"
+    #[arg(long, value_name = "MODEL")]
+    sensor: Option<SensorModel>,
     /// Map the simulated scans, at their true poses, once for each threshold that is 0.7 and 1.4 times as large, and
     /// once each with voxels carved that so many exact rays crossed
     #[arg(long, conflicts_with = "folder")]
@@ -92,6 +96,7 @@ impl Carving {
             scans_a_round: 50,
             resolution_m: self.resolution,
             lidar: SpinningLidar { rings: 64, azimuths: 1024, ..SpinningLidar::default() },
+            sensor: self.sensor,
             carving,
             at_true_poses,
             seed: self.seed,
@@ -143,7 +148,7 @@ impl Carving {
         let poses = true_poses(&scans.join("poses.txt"), files.len(), output)?;
         let mapper = |carving| {
             let settings = MapSettings::new(self.resolution, LEVELS_DEFAULT);
-            CarvingMapper::new(settings, carving, false).map_err(CliError::failed)
+            CarvingMapper::new(settings, carving, false, self.sensor).map_err(CliError::failed)
         };
         let (mut with, mut without) = (mapper(Some(carving))?, mapper(None)?);
         let bar = output.clone().with_bar(files.len());

@@ -15,6 +15,7 @@ use mrol::console::output::Output;
 use mrol_map::geometry::Pose;
 use mrol_map::map::{MultiResolutionMap, RobotName};
 use mrol_map::mapping::{MappingSettings, ViewpointSettings};
+use mrol_map::visibility::SensorModel;
 use mrol_map::voxel::VoxelKey;
 
 const EXAMPLES: &str = "\
@@ -43,6 +44,9 @@ pub(super) struct FreeSpace {
     /// Up to where scans are believed to see, meters
     #[arg(long, value_name = "METERS", default_value_t = 20.0)]
     range: f64,
+    /// How the rays of the sensor lie: "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or "pinhole WIDTH HEIGHT FX FY"
+    #[arg(long, value_name = "MODEL")]
+    sensor: Option<SensorModel>,
     /// Largest number of scans
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     scans_max: u16,
@@ -85,7 +89,8 @@ impl FreeSpace {
         let viewpoints = ViewpointSettings { range_max_m: self.range as f32, ..ViewpointSettings::default() };
         let settings = MappingSettings { viewpoints, ..MappingSettings::default() };
         let output = output.clone().with_bar_of(scans.len(), "scans");
-        map_at_poses(&map, scans, settings, &robot, || output.step()).map_err(CliError::failed)?;
+        map_at_poses(&map, scans, settings, (&robot, self.sensor), || output.step())
+            .map_err(CliError::failed)?;
         output.clear_bar();
         Ok(map)
     }

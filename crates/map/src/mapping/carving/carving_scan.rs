@@ -6,7 +6,7 @@ use crate::geometry::{Point, Pose};
 use crate::map::{MultiResolutionMap, Region, ScanRecord};
 use crate::mapping::error::MappingError;
 use crate::util::StopSignal;
-use crate::visibility::{ScanRays, ScanSurface, SurfaceSettings};
+use crate::visibility::{ScanRays, ScanSurface, SensorRays, SurfaceSettings};
 use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
 
 /// Blocks of voxels that are looked at between two looks at the stop signal.
@@ -43,6 +43,8 @@ pub(in crate::mapping) struct CarvingScan<'a> {
     pub(in crate::mapping) record: &'a ScanRecord,
     /// How far the sensor moved while the points were measured, meters.
     pub(in crate::mapping) moved_m: f64,
+    /// How its rays lie, where the sensor is known.
+    pub(in crate::mapping) sensor: Option<SensorRays>,
 }
 
 impl CarvingScan<'_> {
@@ -63,6 +65,7 @@ impl CarvingScan<'_> {
             grazing_rad: settings.grazing_deg.to_radians() as f32,
             noise_m: resolution_m as f32,
             spacing_m: (sample_step * resolution_m * f64::from(2 * settings.margin_voxels + 1)) as f32,
+            sensor: self.sensor,
             thresholds,
         };
         let surface = ScanSurface::of(self.rays, surface);

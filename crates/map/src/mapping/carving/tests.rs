@@ -77,7 +77,7 @@ fn record(map: &MultiResolutionMap, pose: &Pose, points: &[Point]) -> ScanRecord
 /// What a scan carves of a map.
 fn carved(map: &MultiResolutionMap, pose: &Pose, points: &[Point], settings: &CarvingSettings) -> VoxelSet {
     let record = record(map, pose, points);
-    let scan = CarvingScan { rays: ScanRays::met(points), record: &record, moved_m: 0.0 };
+    let scan = CarvingScan { rays: ScanRays::met(points), record: &record, moved_m: 0.0, sensor: None };
     scan.carve(map, settings, StopSignal::NEVER).unwrap().voxels
 }
 
@@ -203,7 +203,7 @@ fn carving_ends_when_it_is_stopped() {
     let pose = any_pose(&mut random, &Vec::new());
     let points = scan(&mut random, &Vec::new(), &pose, 0.0);
     let record = record(&map, &pose, &points);
-    let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m: 0.0 };
+    let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m: 0.0, sensor: None };
     let gone = || true;
     let stopped = scan.carve(&map, &CarvingSettings::default(), StopSignal::when(&gone));
     assert_eq!(stopped, Err(MappingError::Stopped));
@@ -218,7 +218,7 @@ fn a_sensor_that_moves_meanwhile_carves_no_more_than_one_that_stands() {
     let points = scan(&mut random, &Vec::new(), &pose, 0.0);
     let record = record(&map, &pose, &points);
     let of = |moved_m| {
-        let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m };
+        let scan = CarvingScan { rays: ScanRays::met(&points), record: &record, moved_m, sensor: None };
         scan.carve(&map, &CarvingSettings::default(), StopSignal::NEVER).unwrap().voxels
     };
     let (still, moving) = (of(0.0), of(0.1));

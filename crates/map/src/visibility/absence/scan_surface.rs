@@ -3,8 +3,7 @@
 use super::ray_index::{Ball, RayIndex, RayWindow};
 use crate::visibility::directions::{CubeMap, FACES, Pixel, Projection};
 use crate::visibility::directions::{across, between, distance, norm};
-use crate::visibility::imaging::PointDensity;
-use crate::visibility::imaging::ScanRays;
+use crate::visibility::imaging::{PointDensity, ScanRays, SensorRays};
 use crate::visibility::thresholds::Thresholds;
 
 /// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both
@@ -25,6 +24,8 @@ pub struct SurfaceSettings {
     pub noise_m: f32,
     /// Largest distance between two neighboring samples of the surface, meters.
     pub spacing_m: f32,
+    /// How the rays lie, where the sensor is known.
+    pub sensor: Option<SensorRays>,
     /// What was found by trial.
     pub thresholds: Thresholds,
 }
@@ -69,7 +70,11 @@ impl ScanSurface {
     /// The surface of a scan with these rays; none of a scan without any.
     pub fn of(rays: ScanRays<'_>, settings: SurfaceSettings) -> Option<Self> {
         let mut offsets: Vec<_> = rays.all().map(|point| point.xyz()).collect();
-        let PointDensity { map, .. } = PointDensity::of(&offsets, &settings.thresholds)?;
+        let density = match settings.sensor {
+            Some(sensor) => Some(sensor.density()).filter(|_| !offsets.is_empty()),
+            None => PointDensity::of(&offsets, &settings.thresholds),
+        };
+        let PointDensity { map, .. } = density?;
         let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
         let index = RayIndex::of(map, &[]);
         let mut surface = Self { map, settings, places, hits: Vec::new(), rays: index };
@@ -158,7 +163,7 @@ impl ScanSurface {
         let scale = near.distance_m / far.distance_m;
         let beside_near = far.offset.map(|c| c * scale);
         let across_m = distance(near.offset, beside_near);
-        let SurfaceSettings { grazing_rad, noise_m, spacing_m, thresholds } = self.settings;
+        let SurfaceSettings { grazing_rad, noise_m, spacing_m, thresholds, .. } = self.settings;
         far.distance_m - near.distance_m <= across_m / grazing_rad.tan() + noise_m
             && distance(near.offset, far.offset) <= thresholds.patch_max * spacing_m
     }
@@ -287,8 +292,13 @@ mod tests {
     use super::*;
     use crate::geometry::Point;
 
-    const SETTINGS: SurfaceSettings =
-        SurfaceSettings { grazing_rad: 0.14, noise_m: 0.1, spacing_m: 0.2, thresholds: Thresholds::DEFAULT };
+    const SETTINGS: SurfaceSettings = SurfaceSettings {
+        grazing_rad: 0.14,
+        noise_m: 0.1,
+        spacing_m: 0.2,
+        sensor: None,
+        thresholds: Thresholds::DEFAULT,
+    };
 
     /// Rays half a degree apart about the x axis that end so far away as `end_m` says of their angles to the side and
     /// up, degrees; with those that it says nothing of.

@@ -43,29 +43,44 @@ impl PointDensity {
         seen.find_map(|seen| {
             let Gaps { of_one, wider } = seen.gaps(thresholds.one_surface_max);
             let is_fit = seen.map.tiles() == coarsest || wider <= f64::from(thresholds.sieve_share_max);
-            // Rings one and a half pixels apart leave a gap of one in every second place.
-            is_fit.then(|| Self { map: seen.map, spacing: seen.map.pitch() * (1.0 + of_one as f32) })
+            is_fit.then(|| Self { map: seen.map, spacing: spacing(seen.map, of_one) })
         })
     }
 }
 
+/// How far from each other the points lie as a rule that leave such a share of gaps of one pixel: rings one and a half
+/// pixels apart leave one in every second place.
+pub(super) fn spacing(map: CubeMap, gaps_of_one: f64) -> f32 {
+    map.pitch() * (1.0 + gaps_of_one as f32)
+}
+
 /// Gaps between the pixels in which points lie, as shares of these.
-struct Gaps {
+pub(super) struct Gaps {
     /// Beside or above, whichever has more: gaps of one pixel.
-    of_one: f64,
+    pub(super) of_one: f64,
     /// Gaps of two or more, beside and above.
-    wider: f64,
+    pub(super) wider: f64,
+}
+
+/// How far pixels with points and the next ones beside them are from each other, or above them where that is farther,
+/// radians; 0 where none has a neighbor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbors {
+    /// Mean from one to the next: where several points lie in a pixel it is how wide pixels are.
+    pub(super) apart: f32,
+    /// Mean width of these pixels.
+    pub(super) width: f32,
 }
 
 /// The pixels in which points lie.
-struct SeenPixels {
+pub(super) struct SeenPixels {
     map: CubeMap,
     is_seen: Vec<bool>,
     count: usize,
 }
 
 impl SeenPixels {
-    fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
+    pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
         let mut seen = Self { map, is_seen: vec![false; FACES * map.pixels() * map.pixels()], count: 0 };
         for projection in offsets.iter().filter_map(|&offset| map.project(offset)) {
             let [column, row] = projection.pixel;
@@ -76,27 +91,53 @@ impl SeenPixels {
     }
 
     /// Gaps, of which those as wide as `most` or wider are none between points of one surface.
-    fn gaps(&self, most: f32) -> Gaps {
-        let side = self.map.pixels();
+    pub(super) fn gaps(&self, most: f32) -> Gaps {
+        // Without a limit it is the largest number.
         let most = (most / self.map.pitch()) as usize;
         let (mut of_one, mut wider) = ([0usize; 2], 0);
-        let mut note = |direction: usize, before: Option<usize>, at: usize| {
-            let not_seen = before.map_or(0, |before| at - before - 1);
-            of_one[direction] += usize::from(not_seen == 1);
+        self.for_neighbors(|axis, not_seen, _| {
+            of_one[axis] += usize::from(not_seen == 1);
             wider += usize::from((2..most).contains(&not_seen));
-        };
+        });
+        let share = |count: usize| count as f64 / self.count.max(1) as f64;
+        Gaps { of_one: share(of_one[0].max(of_one[1])), wider: share(wider) }
+    }
+
+    /// How far neighbors are from each other where no more than one pixel is between them.
+    pub(super) fn neighbors(&self) -> Neighbors {
+        let (mut apart, mut widths, mut counts) = ([0.0; 2], [0.0; 2], [0usize; 2]);
+        self.for_neighbors(|axis, not_seen, pixel| {
+            if not_seen < 2 {
+                let step = if axis == 0 { [1, 0] } else { [0, 1] };
+                let width = f64::from(self.map.pitch() * self.map.angle_of_step(pixel, step));
+                apart[axis] += width * (not_seen + 1) as f64;
+                widths[axis] += width;
+                counts[axis] += 1;
+            }
+        });
+        let mean = |sums: [f64; 2], axis: usize| (sums[axis] / counts[axis].max(1) as f64) as f32;
+        let farther = usize::from(mean(apart, 1) > mean(apart, 0));
+        Neighbors { apart: mean(apart, farther), width: mean(widths, farther) }
+    }
+
+    /// Calls `f` for each pixel and the one before it in its row (axis 0), and in its column (axis 1): with how many
+    /// between them are not seen, and the pixel.
+    fn for_neighbors(&self, mut f: impl FnMut(usize, usize, [usize; 2])) {
+        let side = self.map.pixels();
         for face in self.is_seen.chunks(side * side) {
-            let mut below = vec![None; side];
+            let mut below: Vec<Option<usize>> = vec![None; side];
             for (row, pixels) in face.chunks(side).enumerate() {
-                let mut left = None;
+                let mut left: Option<usize> = None;
                 for column in (0..side).filter(|&column| pixels[column]) {
-                    note(0, left.replace(column), column);
-                    note(1, below[column].replace(row), row);
+                    if let Some(left) = left.replace(column) {
+                        f(0, column - left - 1, [column, row]);
+                    }
+                    if let Some(below) = below[column].replace(row) {
+                        f(1, row - below - 1, [column, row]);
+                    }
                 }
             }
         }
-        let share = |count: usize| count as f64 / self.count.max(1) as f64;
-        Gaps { of_one: share(of_one[0].max(of_one[1])), wider: share(wider) }
     }
 }
 

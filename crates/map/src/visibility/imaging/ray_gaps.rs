@@ -9,9 +9,18 @@ pub(super) struct RayGaps<'a> {
     pub(super) map: CubeMap,
     /// How far from each other rays run as a rule, as the side of a square at depth 1.
     pub(super) spacing: f32,
+    /// Gaps that are no wider are not told, radians.
+    pub(super) least: f32,
     /// Where rays ended: offsets from the sensor.
     pub(super) offsets: &'a [[f32; 3]],
     pub(super) thresholds: &'a Thresholds,
+}
+
+/// Where a ray ran on its face.
+struct Ran {
+    pixel: [usize; 2],
+    /// Along each side, see [`CubeMap::on_plane`].
+    place: [f32; 2],
 }
 
 /// Where the rays in a pixel ran on its face: the smallest and the largest coordinate, to the right and up.
@@ -21,17 +30,22 @@ impl RayGaps<'_> {
     /// Calls `f` for the pixels between rays in which none ran, with the direction of the pixel's middle and how wide
     /// the gap is in which it lies, radians.
     pub(super) fn for_each(&self, mut f: impl FnMut([f32; 3], f32)) {
-        // Face by face: all of them would take some memory.
-        (0..FACES).for_each(|face| self.for_each_on(face, &mut f));
+        let mut of_faces: [Vec<Ran>; FACES] = Default::default();
+        for &offset in self.offsets {
+            let Some(Projection { face, pixel, .. }) = self.map.project(offset) else { continue };
+            of_faces[face].push(Ran { pixel, place: self.map.on_plane(face, offset) });
+        }
+        // Face by face: the pixels of all of them would take some memory.
+        of_faces.iter().enumerate().for_each(|(face, ran)| self.for_each_on(face, ran, &mut f));
     }
 
-    fn for_each_on(&self, face: usize, f: &mut impl FnMut([f32; 3], f32)) {
+    fn for_each_on(&self, face: usize, ran: &[Ran], f: &mut impl FnMut([f32; 3], f32)) {
+        if ran.is_empty() {
+            return;
+        }
         let side = self.map.pixels();
         let (mut numbers, mut bounds) = (vec![0u32; side * side], Vec::<Bounds>::new());
-        for &offset in self.offsets {
-            let seen = self.map.project(offset).filter(|seen| seen.face == face);
-            let Some(Projection { pixel: [column, row], .. }) = seen else { continue };
-            let [u, v] = self.map.on_plane(face, offset);
+        for &Ran { pixel: [column, row], place: [u, v] } in ran {
             let number = &mut numbers[row * side + column];
             if *number == 0 {
                 bounds.push([[u, u], [v, v]]);
@@ -40,9 +54,6 @@ impl RayGaps<'_> {
             let [of_u, of_v] = &mut bounds[*number as usize - 1];
             *of_u = [of_u[0].min(u), of_u[1].max(u)];
             *of_v = [of_v[0].min(v), of_v[1].max(v)];
-        }
-        if bounds.is_empty() {
-            return;
         }
         let bounds_at = |at: usize| (numbers[at] > 0).then(|| bounds[numbers[at] as usize - 1]);
         // To the side and up; 0 where a ray ran, infinite where none ran on a side.
@@ -61,7 +72,7 @@ impl RayGaps<'_> {
     }
 
     /// How wide the gap is in which a pixel lies, radians; none of one at the edge of what was seen, without rays on
-    /// both sides.
+    /// both sides, and of a gap that is not told.
     fn width(&self, gaps: &[[f32; 2]], pixel: [usize; 2]) -> Option<f32> {
         let side = self.map.pixels();
         let at = pixel[1] * side + pixel[0];
@@ -71,13 +82,19 @@ impl RayGaps<'_> {
             let behind = (place + 1 < side).then(|| gaps[at + step][axis]);
             before.into_iter().chain(behind).filter(|gap| *gap > 0.0).fold(gaps[at][axis], f32::min)
         };
-        let to_side = narrowest(0, pixel[1], side) * self.map.angle_of_step(pixel, [1, 0]);
-        let up = narrowest(1, pixel[0], 1) * self.map.angle_of_step(pixel, [0, 1]);
+        let [to_side, up] = [narrowest(0, pixel[1], side), narrowest(1, pixel[0], 1)];
+        // No angle is larger than its length on the face.
+        if to_side.min(up) <= self.least || to_side.min(up).is_infinite() {
+            return None;
+        }
+        let to_side = to_side * self.map.angle_of_step(pixel, [1, 0]);
+        let up = up * self.map.angle_of_step(pixel, [0, 1]);
         let (width, length) = (to_side.min(up), to_side.max(up));
         let Thresholds { lost_width_max, lost_length_max, lost_weight, .. } = self.thresholds;
         let is_of_lost_rays =
             width <= lost_width_max * self.spacing && length <= lost_length_max * self.spacing;
-        width.is_finite().then_some(if is_of_lost_rays { lost_weight * width } else { width })
+        let counts = if is_of_lost_rays { lost_weight * width } else { width };
+        (counts > self.least).then_some(counts)
     }
 }
 
@@ -123,6 +140,7 @@ mod tests {
         let gaps = RayGaps {
             map: CubeMap::new(32),
             spacing: 0.5f32.to_radians(),
+            least: 0.0,
             offsets: rays,
             thresholds: &Thresholds::DEFAULT,
         };

@@ -7,8 +7,13 @@ use super::super::{SurfaceSettings, Sweep, Thresholds};
 use crate::geometry::{Point, Pose};
 
 pub(super) const RANGE: Sweep = Sweep::standing(40.0);
-pub(super) const SURFACE: SurfaceSettings =
-    SurfaceSettings { grazing_rad: 0.14, noise_m: 0.05, spacing_m: 0.1, thresholds: Thresholds::DEFAULT };
+pub(super) const SURFACE: SurfaceSettings = SurfaceSettings {
+    grazing_rad: 0.14,
+    noise_m: 0.05,
+    spacing_m: 0.1,
+    sensor: None,
+    thresholds: Thresholds::DEFAULT,
+};
 
 /// A scan from the middle of a room of 6 x 4 x 3 m, seen through a window of directions.
 pub(super) fn room(random: &mut ChaCha8Rng, points: usize, around: f32) -> Vec<Point> {
