@@ -34,8 +34,8 @@ section! {
         keep_zeros: bool = false; none;
         /// Points beyond `range_max_m` say nothing. Otherwise they tell that nothing was met up to there.
         beyond_range_is_noise: bool = false; none;
-        /// Which way its sensor's axes point: `robot` (x ahead, y left, z up) or `optical` (a camera's: x right, y down,
-        /// z ahead). Decides how the first scan of an empty map lies if no guess says.
+        /// Which way its sensor's axes point: `robot` (x ahead, y left, z up) or `optical` (a camera's: x right, y
+        /// down, z ahead). Decides how the first scan of an empty map lies if no guess says.
         axes: ByKeyword<SensorAxes> = ByKeyword::default(); none;
         /// Height of its sensor above the floor. The first scan of an empty map is put there if no guess says.
         sensor_height_m: f64 = 0.0; m, from -SENSOR_HEIGHT_MAX_M, to SENSOR_HEIGHT_MAX_M;

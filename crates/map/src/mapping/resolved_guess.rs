@@ -9,8 +9,8 @@ use crate::map::{MappedScan, RobotName, Trajectory};
 impl Guess {
     /// The pose that the guess stands for: map_from_sensor.
     ///
-    /// A robot without an accepted scan is at `first_pose`, which is none of a map that is not empty. The last accepted pose of a robot that stands
-    /// still is where it was seen last, though that scan is not kept.
+    /// A robot without an accepted scan is at `first_pose`, which is none of a map that is not empty. The last accepted
+    /// pose of a robot that stands still is where it was seen last, though that scan is not kept.
     ///
     /// # Errors
     /// The guess needs an accepted scan of the robot, there is none, and the map is not empty.
