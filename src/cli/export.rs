@@ -22,7 +22,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol export hall.mrol --out hall.ply                a map file, as `mrol map` and `mrol snapshot` write it
   mrol export --map office --out office.pcd           a map of a server
-  mrol export --map office --level 2 --out coarse.ply one point for each voxel four times as large
+  mrol export --map office --level 2 --out far.ply    one point for each voxel four times as large
 
 The file has a point at the center of each occupied voxel of the level, x y z as float32 in the map frame, meters, binary
 and little-endian. The origin of a map of a survey is printed and not added: float32 would round the sums. The file is a
