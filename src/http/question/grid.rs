@@ -80,8 +80,8 @@ pub(in crate::http) struct GridHead {
     #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     cells_free: Option<u64>,
-    /// The lowest and the highest floor of these cells, meters of the map frame, where heights count from the floor and it
-    /// reaches any.
+    /// The lowest and the highest floor of these cells, meters of the map frame, where heights count from the floor and
+    /// it reaches any.
     #[schema(value_type = Option<Vector2>, nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     floor_m: Option<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! Grids whose band counts from the floor: found alike by the server, over both protocols and in tiles, and by a replica.
+//! Grids whose band counts from the floor: alike over both protocols, in tiles, and by a replica.
 
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::geometry::{Point, Pose};

@@ -4,6 +4,8 @@
 mod cells;
 mod extent;
 mod floor;
+#[cfg(test)]
+mod floor_scenes;
 mod free;
 mod keep_outs;
 mod map_server;

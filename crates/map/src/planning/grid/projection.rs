@@ -18,8 +18,8 @@ pub(super) struct Projection<'a> {
     /// Voxels along a cell's side.
     pub(super) cell_voxels: i64,
     pub(super) cell_m: f64,
-    /// Lowest and highest index of the voxels that reach into the band, from the first voxel above the floor where there
-    /// is one.
+    /// Lowest and highest index of the voxels that reach into the band, from the first voxel above the floor where
+    /// there is one.
     band: [i32; 2],
     floor: Option<&'a Floor>,
 }
@@ -111,8 +111,8 @@ impl<'a> Projection<'a> {
         }
     }
 
-    /// Where the voxels of the band begin and end, meters: what holds their centers, however thin the band. Above all of
-    /// the floor, and with the voxels that the floor itself lies in.
+    /// Where the voxels of the band begin and end, meters: what holds their centers, however thin the band. Above all
+    /// of the floor, and with the voxels that the floor itself lies in.
     fn heights_m(&self) -> [f64; 2] {
         let [first, last] = self.band.map(f64::from);
         let [low, high] = self.base_range().map(f64::from);

@@ -44,7 +44,7 @@ pub(in crate::planning::grid) struct Height {
 impl Floor {
     /// The floor that has the tops of these voxels of side `voxel_m`, each with the lowest z of the voxels without a
     /// gap from there down; of two in one column that of the first. Once stopped, it lacks some.
-    pub(super) fn of(
+    pub(in crate::planning::grid) fn of(
         voxel_m: f64,
         columns: impl Iterator<Item = ([i32; 3], i32)>,
         stop: StopSignal<'_>,
@@ -127,7 +127,7 @@ fn distance_squared(from: [i32; 2], to: [i32; 2]) -> i128 {
 #[cfg(test)]
 impl Floor {
     /// The columns that the floor reaches.
-    pub(super) fn columns(&self) -> impl Iterator<Item = [i32; 2]> {
+    pub(in crate::planning::grid) fn columns(&self) -> impl Iterator<Item = [i32; 2]> {
         self.heights.keys().copied()
     }
 }

@@ -9,8 +9,6 @@ mod find;
 mod height;
 mod regions;
 mod surfaces;
-#[cfg(test)]
-mod tests;
 
 pub use find::find_floor;
 pub use height::Floor;
