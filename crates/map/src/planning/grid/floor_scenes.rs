@@ -132,7 +132,7 @@ fn room(scene: &mut Scene, height_m: impl Fn(f64, f64) -> f64) {
     for x in [-5.0, 5.0] {
         scene.wall([x, -4.0], [x, 4.0], height_m(x, 0.0));
     }
-    scene.places_m.extend((-4..=4).map(|x| f64::from(x)).map(|x| [x, 0.0, height_m(x, 0.0) + SENSOR_M]));
+    scene.places_m.extend((-4..=4).map(f64::from).map(|x| [x, 0.0, height_m(x, 0.0) + SENSOR_M]));
 }
 
 /// Voxels of a building, of a yard and of a street, meters.
