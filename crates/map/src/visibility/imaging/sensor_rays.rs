@@ -123,7 +123,7 @@ impl SensorRays {
         PointDensity { map: self.map, spacing: self.spacing }
     }
 
-    /// True of pixels of which each has a ray, the narrowest too; and of those that are as wide as what a point tells of.
+    /// True of pixels of which each has a ray, the narrowest too; and of those as wide as what a point tells of.
     pub(super) fn meet_all(self, map: CubeMap, thresholds: &Thresholds) -> bool {
         map.pitch() * NARROWEST as f32 >= self.step || map.pitch() >= thresholds.spacing_max
     }
