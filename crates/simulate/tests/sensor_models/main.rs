@@ -2,6 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::visibility::{
     AbsenceEvidence, IMAGE_BYTES_MAX, RangeImage, ScanRays, ScanSurface, SensorModel, SensorRays,
@@ -233,4 +236,38 @@ fn a_model_of_fewer_rays_than_points_and_of_another_sensor_is_not_used() {
     assert!(camera.contains("rays are missing") || camera.contains("degrees apart"), "{camera}");
     let few = refused("spinning 32 900 -21.3 21.3", &[points[0]]);
     assert!(few.contains("rays are missing"), "{few}");
+}
+
+#[test]
+#[ignore = "figures of docs/measurements.md (Known sensors)"]
+fn figures_of_times() {
+    for seen in Seen::all(1) {
+        let points = seen.finite();
+        let known = || SensorRays::confirmed(&seen.model, &points).ok();
+        assert!(known().is_some(), "{}", seen.name);
+        // In turns, the shortest of each: others are at work on the machine.
+        let mut shortest = [Duration::MAX; 4];
+        for _ in 0..15 {
+            let ways: [&dyn Fn(); 4] = [
+                &|| drop(black_box(image(&points, None))),
+                &|| drop(black_box(image(&points, known()))),
+                &|| drop(black_box(surface(&points, None))),
+                &|| drop(black_box(surface(&points, known()))),
+            ];
+            for (shortest, way) in shortest.iter_mut().zip(ways) {
+                let start = Instant::now();
+                way();
+                *shortest = start.elapsed().min(*shortest);
+            }
+        }
+        let [image, image_known, surface, surface_known] = shortest.map(|time| time.as_secs_f64() * 1e3);
+        println!(
+            "{}, {} points: image {image:.1} ms, known {image_known:.1}, {:.2}; surface {surface:.1}, known \
+             {surface_known:.1}, {:.2}",
+            seen.name,
+            points.len(),
+            image_known / image,
+            surface_known / surface
+        );
+    }
 }
