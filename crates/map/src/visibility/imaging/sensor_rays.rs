@@ -59,7 +59,8 @@ pub enum SensorMismatch {
     },
     /// Many points have none beside them where the model has rays.
     #[error(
-        "its sensor model \"{model}\" is not used: beside {:.1} % of the points rays are missing, {:.1} at most may be",
+        "its sensor model \"{model}\" is not used: rays are missing beside its points, {:.1} times for 100 of them, {:.1} \
+         at most may be",
         100.0 * share,
         100.0 * share_max
     )]
