@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 31] = [
+const COMMANDS: [&str; 30] = [
     "serve",
     "demo",
     "map",

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::agreement::{RayAgreement, RayCounts, Rays, Rival};
 use super::evidence::{
     AGREEMENT_MIN, EVIDENCE_MIN, EVIDENCE_OF_BOTH_MIN, has_evidence, in_rank, is_hardly_contradicted,
-    vouched_share,
+    is_vouched_for,
 };
 use super::fit::Fit;
 use super::look::{Look, is_contradicted_times_as_much};
@@ -204,11 +204,14 @@ impl<'a> Ends<'a> {
         }
         let from_guess = self.prior.map(|prior| pose_difference(&prior.guess, &found.map_from_sensor).0);
         let is_near = self.is_near(&found.map_from_sensor);
-        let share = if is_near { vouched_share(agreement) } else { agreement.worse() };
-        if share < AGREEMENT_MIN {
+        if agreement.worse() < AGREEMENT_MIN && !(is_near && is_vouched_for(agreement)) {
             let (a, b) = (of_scan.contradicted_share(), of_map.contradicted_share());
             let words = "of the scan's points and of what earlier scans met are contradicted";
-            let sides = if is_near { "of each that shows enough" } else { "of one, so far from the guess," };
+            let sides = if is_near {
+                "of both, or of one if the other is clear,"
+            } else {
+                "of one, so far from the guess,"
+            };
             let most = 1.0 - AGREEMENT_MIN;
             let reason = format!("{a:.3} and {b:.3} {words}: at most {most:.1} {sides} may be");
             return Some((Verdict::Contradicted, reason));

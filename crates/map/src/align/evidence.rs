@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use super::agreement::{RayAgreement, RayCounts};
+use super::agreement::RayAgreement;
+use super::look::CLUSTERING;
 
 /// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
 /// nothing of each other cannot be compared.
@@ -11,6 +12,8 @@ pub(super) const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
 /// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
 pub(super) const AGREEMENT_MIN: f64 = 0.9;
+/// Standard deviations that are no chance.
+const CLEARLY: f64 = 3.0;
 
 /// True of a pose at which the scan and earlier scans saw enough of each other to be compared.
 pub(super) fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
@@ -18,11 +21,14 @@ pub(super) fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> b
     a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
-/// The larger share of the two sides, of those that saw enough of the other to tell: people and what was moved
-/// contradict one side only, and a side that sees a small part of what the other one does vouches for nothing.
-pub(super) fn vouched_share(RayAgreement { of_scan, of_map }: &RayAgreement) -> f64 {
-    let that_tell = [of_scan, of_map].into_iter().filter(|side| side.evidence() >= EVIDENCE_MIN);
-    that_tell.map(RayCounts::share).fold(0.0, f64::max)
+/// True where one side alone tells, [clearly](CLEARLY), that the pose is contradicted less than [`AGREEMENT_MIN`] leaves:
+/// people and what was moved contradict one side only. A few points that agree by chance tell nothing.
+pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
+    [of_scan, of_map].into_iter().any(|side| {
+        let contradicted = side.contradicted as f64;
+        let most = (1.0 - AGREEMENT_MIN) * (side.agree as f64 + contradicted);
+        (most - contradicted) / (most + contradicted).sqrt() / CLUSTERING >= CLEARLY
+    })
 }
 
 /// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is
@@ -45,19 +51,22 @@ pub(super) fn in_rank(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::align::agreement::RayCounts;
 
     fn counts(agree: usize, contradicted: usize) -> RayCounts {
         RayCounts { asked: 800, agree, contradicted }
     }
 
     #[test]
-    fn a_side_that_shows_little_of_the_other_does_not_vouch_for_a_pose_that_the_other_contradicts() {
-        let vouched = |of_scan, of_map| vouched_share(&RayAgreement { of_scan, of_map });
+    fn a_side_with_few_points_does_not_vouch_for_a_pose_that_the_other_one_contradicts() {
+        let is_vouched_for = |of_scan, of_map| is_vouched_for(&RayAgreement { of_scan, of_map });
         // A crowd before the scan: what it hides says nothing, and what is seen beside it agrees.
         let crowd = counts(400, 230);
-        assert_eq!(vouched(crowd, counts(400, 0)), 1.0);
-        assert_eq!(vouched(crowd, counts(60, 0)), crowd.share());
-        assert_eq!(vouched(counts(60, 0), counts(400, 100)), 0.8);
+        assert!(is_vouched_for(crowd, counts(400, 3)));
+        assert!(!is_vouched_for(crowd, counts(400, 40)), "a tenth of it, but for chance");
+        // A camera of another place: of what an earlier scan met seven points lie in its view, and six of them fit.
+        assert!(!is_vouched_for(counts(245, 139), RayCounts { asked: 7, agree: 6, contradicted: 0 }));
+        assert!(!is_vouched_for(counts(0, 0), counts(0, 0)));
     }
 
     #[test]

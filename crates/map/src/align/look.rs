@@ -13,7 +13,7 @@ use crate::visibility::Sight;
 
 /// How many times the deviation of as many single points the difference between two poses has that are equal in truth:
 /// points beside each other are met or missed together. Of 800 and 8 times 500 points, from trials with exact rays.
-const CLUSTERING: f64 = 1.6;
+pub(super) const CLUSTERING: f64 = 1.6;
 
 /// What each point says of a scan at a pose: those of the scan, and those that the witnesses met.
 #[derive(Debug)]
