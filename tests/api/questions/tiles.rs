@@ -92,7 +92,7 @@ async fn a_site_that_is_too_large_for_one_answer_comes_in_tiles_over_both_protoc
     assert!(ones(&near.occupied) > 1000);
 
     let body = json!({"area": {"min_m": [-128, -128], "max_m": [128, 128]}, "min_z_m": -0.5, "max_z_m": 0.5,
-                      "tell_unknown": true});
+                      "band_from": "map", "tell_unknown": true});
     let answer = daemon.post("/v1/maps/a/grid/tiles", body).await;
     assert_eq!(answer.headers()["content-type"], "application/octet-stream");
     let tiles = tiles_of(&answer.bytes().await.unwrap());

@@ -12,7 +12,7 @@ use crate::map_service::{Inner, MapService};
 use crate::maps::HostedMap;
 use crate::observer::Outcome;
 use crate::work::TimeLimit;
-use mrol_map::map::MapName;
+use mrol_map::map::{MapName, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 
 /// A question that is answered in about so long, nanoseconds, is answered where it arrives: handing it over takes two
@@ -64,7 +64,8 @@ impl MapService {
             };
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
-                let _reserved = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
+                let bytes = bytes_of(&question, &map.map, limits);
+                let _reserved = inner.budget.reserve_transient(bytes as u64, ANSWER)?;
                 let answer = |stop: StopSignal<'_>| {
                     map.answer_question(&map.questioned(limits), &question, limits, stop)
                 };
@@ -96,7 +97,8 @@ impl Inner {
         question: &Q,
     ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
         let limits = &self.settings.limits;
-        let is_small = question.work_ns() <= INLINE_NS && bytes_of(question, limits) <= INLINE_BYTES;
+        let is_small =
+            question.work_ns() <= INLINE_NS && bytes_of(question, &map.map, limits) <= INLINE_BYTES;
         if !is_small || self.lanes.planning.is_wanted() {
             return None;
         }
@@ -115,9 +117,9 @@ fn with_way_out(error: ServiceError, way_out: &str) -> ServiceError {
     }
 }
 
-/// Bytes of memory that a question takes, at most.
-fn bytes_of<Q: Question>(question: &Q, limits: &Limits) -> usize {
-    question.answer_bytes(limits).saturating_add(question.work_bytes())
+/// Bytes of memory that a question about a map takes, at most.
+fn bytes_of<Q: Question>(question: &Q, map: &MultiResolutionMap, limits: &Limits) -> usize {
+    question.answer_bytes(limits).saturating_add(question.work_bytes(map))
 }
 
 impl HostedMap {
@@ -148,7 +150,7 @@ mod tests {
     use crate::request::PointCloud;
     use crate::settings::ServiceSettings;
     use mrol_map::geometry::Point;
-    use mrol_map::map::{MapContents, MapSettings, MultiResolutionMap};
+    use mrol_map::map::{MapContents, MapSettings};
     use mrol_map::planning::{Body, Link, Sphere, Surroundings, Unknown};
     use mrol_map::voxel::{VoxelKey, VoxelSet};
     use mrol_store::OpeningProgress;

@@ -7,7 +7,7 @@ use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::work::check_not_stopped;
-use mrol_map::map::ContentVersion;
+use mrol_map::map::{ContentVersion, MultiResolutionMap};
 use mrol_map::planning::{BandFrom, Grid, GridArea, GridError, GridRequest, project_grid};
 use mrol_map::util::StopSignal;
 use mrol_map::voxel::Lattice;
@@ -40,6 +40,8 @@ pub struct GridScope {
 const BYTES_EACH: usize = 5;
 /// Bytes of a cell that is told to be free or unknown while that is found: how many of its columns are free.
 const WORK_BYTES_EACH: usize = 4;
+/// Bytes of a voxel while the floor is looked for, at most: each may be a surface of its own.
+const FLOOR_BYTES_EACH: usize = 70;
 
 impl GridScope {
     /// True where the floor has to be found for it: a band without bounds counts from nothing.
@@ -49,6 +51,13 @@ impl GridScope {
 }
 
 impl GridQuestion {
+    /// Bytes of memory that finding the floor takes, where it has to be found.
+    pub(super) fn floor_bytes(&self, map: &MultiResolutionMap) -> usize {
+        let voxels =
+            map.settings().levels.checked_sub(1).map_or(0, |last| map.voxels(self.asked.level.min(last)));
+        if self.scope.needs_floor() { voxels as usize * FLOOR_BYTES_EACH } else { 0 }
+    }
+
     /// Most cells of an answer.
     pub(super) fn cells_max(limits: &Limits) -> usize {
         limits.grid_cells_max.min(limits.message_bytes_max / BYTES_EACH)
@@ -78,6 +87,10 @@ impl Question for GridQuestion {
     fn answer_bytes(&self, limits: &Limits) -> usize {
         let work = if self.scope.tells_unknown { WORK_BYTES_EACH } else { 0 };
         Self::cells_max(limits) * (BYTES_EACH + work)
+    }
+
+    fn work_bytes(&self, map: &MultiResolutionMap) -> usize {
+        self.floor_bytes(map)
     }
 
     /// It walks all voxels of the area: never a short question.

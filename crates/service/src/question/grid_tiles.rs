@@ -13,9 +13,10 @@ use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::map_service::MapService;
+use crate::resources::Reservation;
 use crate::watch::{Teller, stream_of};
 use crate::work::check_not_stopped;
-use mrol_map::map::{ContentVersion, MapName};
+use mrol_map::map::{ContentVersion, MapName, MultiResolutionMap};
 use mrol_map::planning::{Floor, Grid, GridArea, GridExtent, GridRequest, grid_extent, project_grid_above};
 use mrol_map::util::StopSignal;
 
@@ -25,6 +26,8 @@ pub const TILED_CELLS_MAX: usize = 1 << 28;
 /// number of blocks, so that no block is looked into for two tiles.
 const TILE_CELLS: i64 = 256;
 const TILE_VOXELS: i64 = 512;
+/// Name under which the memory of a floor is reserved, for refusals.
+const FLOOR: &str = "the floor of a grid in tiles";
 /// Bytes of a cell of a tile while it is drawn.
 const BYTES_EACH: usize = 9;
 
@@ -56,6 +59,8 @@ pub struct GridTiles {
     /// The number of the next one.
     next: usize,
     begun: Instant,
+    /// Memory of the floor.
+    _reserved: Reservation,
 }
 
 impl MapService {
@@ -69,7 +74,11 @@ impl MapService {
         // Every tile is of the map that was measured.
         let asked = Asked { map_uuid: Some(extent.version.map_uuid), ..question.asked };
         let (service, map, question) = (self.clone(), map.clone(), GridQuestion { asked, ..question });
-        Ok(GridTiles { service, map, question, extent: extent.answer, next: 0, begun: Instant::now() })
+        let extent = extent.answer;
+        // All tiles count from one floor, which stays until the last one is taken.
+        let floor_bytes = extent.floor.as_ref().map_or(0, |floor| floor.memory_bytes());
+        let reserved = self.inner.budget.reserve_transient(floor_bytes as u64, FLOOR)?;
+        Ok(GridTiles { service, map, question, extent, next: 0, begun: Instant::now(), _reserved: reserved })
     }
 }
 
@@ -191,6 +200,10 @@ impl Question for ExtentQuestion {
 
     fn answer_bytes(&self, _: &Limits) -> usize {
         size_of::<GridExtent>()
+    }
+
+    fn work_bytes(&self, map: &MultiResolutionMap) -> usize {
+        self.0.floor_bytes(map)
     }
 
     /// Where no area is given it walks all voxels: never a short question.

@@ -11,7 +11,7 @@ use super::questioned_map::QuestionedMap;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::ended_early;
-use mrol_map::map::ContentVersion;
+use mrol_map::map::{ContentVersion, MultiResolutionMap};
 use mrol_map::planning::{
     Before, Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings,
     prepared_bytes,
@@ -56,7 +56,7 @@ impl Question for MotionCheck {
         self.lengths.len() * BYTES_EACH
     }
 
-    fn work_bytes(&self) -> usize {
+    fn work_bytes(&self, _: &MultiResolutionMap) -> usize {
         let (links, poses) = (self.body.links().len(), self.configurations.len() / NUMBERS_PER_POSE);
         prepared_bytes(self.lengths.len(), poses / links, links)
     }
@@ -132,6 +132,7 @@ impl Question for MotionCheck {
 mod tests {
     use super::*;
     use mrol_map::geometry::Point;
+    use mrol_map::map::MapSettings;
     use mrol_map::planning::Link;
 
     #[test]
@@ -148,7 +149,9 @@ mod tests {
             surroundings: Surroundings::default(),
         };
         // Two ways of a link, of two poses each, and their lists.
-        assert!(check(1000).work_bytes() > 1000 * 2 * 128, "{}", check(1000).work_bytes());
-        assert_eq!(check(2000).work_bytes(), 2 * check(1000).work_bytes());
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 1)).unwrap();
+        let bytes = |motions| check(motions).work_bytes(&map);
+        assert!(bytes(1000) > 1000 * 2 * 128, "{}", bytes(1000));
+        assert_eq!(bytes(2000), 2 * bytes(1000));
     }
 }

@@ -7,7 +7,7 @@ use super::known::KnownPart;
 use super::questioned_map::QuestionedMap;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
-use mrol_map::map::ContentVersion;
+use mrol_map::map::{ContentVersion, MultiResolutionMap};
 use mrol_map::util::StopSignal;
 
 /// A question of a planner.
@@ -27,8 +27,9 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// Bytes of memory that its answer takes, at most.
     fn answer_bytes(&self, limits: &Limits) -> usize;
 
-    /// Bytes of memory that finding the answer takes besides it, where that grows with the question.
-    fn work_bytes(&self) -> usize {
+    /// Bytes of memory that finding the answer in a map takes besides it, where that grows with the question or the
+    /// map.
+    fn work_bytes(&self, _: &MultiResolutionMap) -> usize {
         0
     }
 

@@ -75,6 +75,12 @@ impl Floor {
         Self { heights, squares, first, range: [low, high] }
     }
 
+    /// Bytes of memory.
+    pub fn memory_bytes(&self) -> usize {
+        let squares: usize = self.squares.iter().map(HashMap::allocation_size).sum();
+        size_of::<Self>() + self.heights.allocation_size() + squares
+    }
+
     /// The heights in a column that the floor reaches.
     pub(in crate::planning::grid) fn within(&self, column: [i32; 2]) -> Option<Height> {
         self.heights.get(&column).copied()
