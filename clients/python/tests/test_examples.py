@@ -100,7 +100,8 @@ def test_a_planner_of_ompl_flies_round_the_post(client: mrol.Client, hall: mrol.
 
 @pytest.mark.skipif(importlib.util.find_spec("matplotlib") is None, reason="matplotlib is not installed")
 def test_a_picture_is_drawn(client: mrol.Client, hall: mrol.Map, tmp_path: Path) -> None:
-    example("picture.py", "--server", client.address, "--map", hall.name, "--out", tmp_path / "map.png", "--band", -1, 1, "--band-from", "map")
+    band = ("--band", -1, 1, "--band-from", "map")
+    example("picture.py", "--server", client.address, "--map", hall.name, "--out", tmp_path / "map.png", *band)
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -130,7 +130,8 @@ def test_heights_of_a_grid_count_from_the_floor(hall: mrol.Map) -> None:
 @pytest.mark.parametrize("tell_unknown", [False, True])
 def test_a_whole_grid_of_tiles_is_the_grid_at_once(hall: mrol.Map, tell_unknown: bool) -> None:
     # Of 800 cells of a tenth of a meter along x: four tiles.
-    options: dict[str, Any] = {"area": [[-40, -3], [40, 3]], "min_z_m": -1, "max_z_m": 1, "band_from": "map", "tell_unknown": tell_unknown}
+    band = {"min_z_m": -1, "max_z_m": 1, "band_from": "map"}
+    options: dict[str, Any] = {"area": [[-40, -3], [40, 3]], **band, "tell_unknown": tell_unknown}
     tiles: list[tuple[int, int | None]] = []
     at_once, whole = hall.grid(**options), hall.whole_grid(**options, progress=lambda done, of: tiles.append((done, of)))
     assert len(tiles) > 1

@@ -163,7 +163,8 @@ class ScanOperations(MapHandle):
         thought to have been taken (`map_from_sensor`), `motion` how far from the robot's last accepted pose (`last_from_sensor`);
         without either it is that pose. `align=False` adds the scan at its guess. `timestamp_ns` counts from 1970. `point_times`
         (shape (n,), seconds from `timestamp_ns`) undo the sensor's motion during its sweep. `guess_covariance` has shape (6, 6).
-        `sensor` says how the rays of the sensor lie, "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or "pinhole WIDTH HEIGHT FX FY".
+        `sensor` says how the rays of the sensor lie, "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or
+        "pinhole WIDTH HEIGHT FX FY".
 
         Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on.
         After an error with `repeat_with` (`ConnectionLost`, `TimedOut`, ...) it is not known whether the scan is in the map: send
@@ -181,7 +182,7 @@ class ScanOperations(MapHandle):
             "force": flag_of(force, "force"),
             **_guesses(guess, motion, constant_velocity, align),
             **_knowledge(timestamp_ns, gravity_in_sensor, guess_covariance),
-            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict),
+            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict=strict),
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         # Last, so that a scan which is refused here uses no id up.
@@ -227,7 +228,7 @@ class ScanOperations(MapHandle):
             "foreground_level": None if foreground_level is None else level_of(foreground_level, "foreground_level"),
             **_guesses(guess, motion, constant_velocity, True),
             **_knowledge(timestamp_ns, gravity_in_sensor, guess_covariance),
-            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict),
+            **_treatment(method, range_min_m, range_max_m, body_m, sensor, strict=strict),
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         answer = self._send_bytes("alignment", pieces, parameters)
@@ -293,6 +294,7 @@ def _treatment(
     range_max_m: float | None,
     body_m: BoxLike | None,
     sensor: str | None,
+    *,
     strict: bool,
 ) -> dict[str, Parameter]:
     corners = None if body_m is None else Box.of(body_m, "body_m").corners("body_m")

@@ -46,7 +46,8 @@ class UndoOperations(MapHandle):
         Give what `insert` or `delete` answered; or `robot`, `session` and `scan_id`; or `robot` and `since_revision`; or the
         `revision` that the change made. It takes a server with a data folder, and reaches back to `storage.undo_from_revision`.
 
-        Raises `NotFound` (`scan_not_found`, `robot_not_found`), `FailedPrecondition` (`outside_undo_window`, `not_undoable`, `no_journal`).
+        Raises `NotFound` (`scan_not_found`, `robot_not_found`), `FailedPrecondition` (`outside_undo_window`, `not_undoable`,
+        `no_journal`).
         """
         target = {
             "robot": None if robot is None else word_of(robot, "robot"),

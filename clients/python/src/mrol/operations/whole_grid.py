@@ -58,9 +58,10 @@ class WholeGridOperations(MapHandle):
         told of the tiles; what it raises ends it.
 
         Raises `ResourceExhausted` (`grid_too_large`), `DeadlineExceeded` (`time_limit`, beyond `grid_time_max_s`),
-        `InvalidArgument` (`bad_grid`, `point_out_of_range`), `FailedPrecondition` (`no_floor`), and `BadAnswer` where it takes more than `answer_bytes_max`.
+        `InvalidArgument` (`bad_grid`, `point_out_of_range`), `FailedPrecondition` (`no_floor`), and `BadAnswer` where it takes
+        more than `answer_bytes_max`.
         """
-        fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown)
+        fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown=tell_unknown)
         request = Request("POST", self._target("grid", "tiles"), BYTES, body_of_question({**fields, **QUESTION.checked(scope)}))
         bounds, joined = self._caller.bounds, _Tiles(self._caller.bounds.answer_bytes_max)
         with progress_of(checked_progress(progress), self._name, None) as told, self._caller.stream(request) as body:

@@ -76,7 +76,7 @@ class GridQuestions(QuestionGroup):
         Raises `ResourceExhausted` (`grid_too_large`) and `DeadlineExceeded` (`time_limit`), where `mrol.Map.whole_grid` is the way,
         `InvalidArgument` (`bad_grid`, `point_out_of_range`), `FailedPrecondition` (`no_floor`).
         """
-        fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown)
+        fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown=tell_unknown)
         answer = self._backend.ask("grid", fields, QUESTION.checked(scope))
         with reading("size"):
             width, height = (int(of) for of in answer.head.numbers("size", (2,)))
@@ -100,6 +100,7 @@ def fields_of_grid(
     max_z_m: float | None,
     band_from: BandFrom,
     cell_m: float | None,
+    *,
     tell_unknown: bool,
 ) -> dict[str, Any]:
     """What a grid is asked of, as fields of the question."""
