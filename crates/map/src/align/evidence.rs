@@ -21,8 +21,8 @@ pub(super) fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> b
     a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
-/// True where one side alone tells, beyond chance, that less of it is contradicted than [`AGREEMENT_MIN`] leaves: people
-/// and what was moved contradict one side only. A few points tell nothing.
+/// True where one side alone tells, beyond chance, that less of it is contradicted than [`AGREEMENT_MIN`] leaves.
+/// People and what was moved contradict one side only. A few points tell nothing.
 pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
     [of_scan, of_map].into_iter().any(|side| {
         let contradicted = side.contradicted as f64;

@@ -55,7 +55,7 @@ impl GridQuestion {
     pub(super) fn floor_bytes(&self, map: &MultiResolutionMap) -> usize {
         let voxels =
             map.settings().levels.checked_sub(1).map_or(0, |last| map.voxels(self.asked.level.min(last)));
-        if self.scope.needs_floor() { voxels as usize * FLOOR_BYTES_EACH } else { 0 }
+        if self.scope.needs_floor() { voxels * FLOOR_BYTES_EACH } else { 0 }
     }
 
     /// Most cells of an answer.
