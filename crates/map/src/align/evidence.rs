@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::agreement::RayAgreement;
+use super::agreement::{RayAgreement, RayCounts};
 use super::look::CLUSTERING;
 
 /// Least share of points that agree, of the side that shows more of the other, and of the other one: two that see
@@ -12,8 +12,6 @@ pub(super) const EVIDENCE_OF_BOTH_MIN: f64 = 0.05;
 /// Least share of points that agree, of those of which anything is known: of the better side near the guess, since
 /// people and what was moved contradict one side only; farther away, where some pose of many fits by chance, of both.
 pub(super) const AGREEMENT_MIN: f64 = 0.9;
-/// Standard deviations that are no chance.
-const CLEARLY: f64 = 3.0;
 
 /// True of a pose at which the scan and earlier scans saw enough of each other to be compared.
 pub(super) fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
@@ -21,14 +19,18 @@ pub(super) fn has_evidence(RayAgreement { of_scan, of_map }: &RayAgreement) -> b
     a.max(b) >= EVIDENCE_MIN && a.min(b) >= EVIDENCE_OF_BOTH_MIN
 }
 
-/// True where one side alone tells, beyond chance, that less of it is contradicted than [`AGREEMENT_MIN`] leaves.
-/// People and what was moved contradict one side only. A few points tell nothing.
+/// True where one side alone tells that a pose is right: people and what was moved contradict one side only. Its share
+/// counts as that of further points is to be expected, so that a few that agree by chance tell nothing.
 pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) -> bool {
-    [of_scan, of_map].into_iter().any(|side| {
-        let contradicted = side.contradicted as f64;
-        let most = (1.0 - AGREEMENT_MIN) * (side.agree as f64 + contradicted);
-        (most - contradicted) / (most + contradicted).sqrt() / CLUSTERING >= CLEARLY
-    })
+    [of_scan, of_map].into_iter().any(|side| expected_share(side) >= AGREEMENT_MIN)
+}
+
+/// The share that agrees of further points like those of a side: (a + 1) / (a + c + 2) after a that agree and c that are
+/// contradicted (Laplace's rule of succession), where points beside each other count as fewer, see [`CLUSTERING`].
+fn expected_share(side: &RayCounts) -> f64 {
+    let independent = |points: usize| points as f64 / (CLUSTERING * CLUSTERING);
+    let (agree, contradicted) = (independent(side.agree), independent(side.contradicted));
+    (agree + 1.0) / (agree + contradicted + 2.0)
 }
 
 /// True of a pose at which little of what is known of one side at least is contradicted: nothing is, where nothing is
@@ -51,7 +53,6 @@ pub(super) fn in_rank(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::agreement::RayCounts;
 
     fn counts(agree: usize, contradicted: usize) -> RayCounts {
         RayCounts { asked: 800, agree, contradicted }
@@ -63,7 +64,7 @@ mod tests {
         // A crowd before the scan: what it hides says nothing, and what is seen beside it agrees.
         let crowd = counts(400, 230);
         assert!(is_vouched_for(crowd, counts(400, 3)));
-        assert!(!is_vouched_for(crowd, counts(400, 40)), "a tenth of it, but for chance");
+        assert!(is_vouched_for(crowd, counts(26, 0)) && !is_vouched_for(crowd, counts(360, 40)));
         // A camera of another place: of what an earlier scan met seven points lie in its view, and six of them fit.
         assert!(!is_vouched_for(counts(245, 139), RayCounts { asked: 7, agree: 6, contradicted: 0 }));
         assert!(!is_vouched_for(counts(0, 0), counts(0, 0)));
