@@ -245,7 +245,7 @@ mod tests {
             let line = format!("{} = {}", code.name().to_str().unwrap(), *code as i32);
             assert!(header.contains(&format!("    {line}")), "{line}");
         }
-        let others = ["MROL_LOOKUP_", "MROL_REGION_", "MROL_MEASURED_TO_"];
+        let others = ["MROL_BAND_FROM_", "MROL_LOOKUP_", "MROL_REGION_", "MROL_MEASURED_TO_"];
         let others: usize = others.iter().map(|other| header.matches(&format!("    {other}")).count()).sum();
         assert_eq!(header.matches("    MROL_").count(), Code::ALL.len() + others);
         assert!(header.contains(&format!("#define MROL_ABI_VERSION {}\n", abi::VERSION)));

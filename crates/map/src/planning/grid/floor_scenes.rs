@@ -14,27 +14,27 @@ use crate::planning::grid::{
 use crate::util::StopSignal;
 use crate::voxel::{VoxelKey, VoxelSet};
 
-const NEVER: StopSignal<'_> = StopSignal::NEVER;
+pub(super) const NEVER: StopSignal<'_> = StopSignal::NEVER;
 /// How high sensors are above the floor, meters.
-const SENSOR_M: f64 = 1.7;
+pub(super) const SENSOR_M: f64 = 1.7;
 /// What a robot of 1.8 m runs into.
-const BAND_M: [f64; 2] = [0.1, 1.8];
+pub(super) const BAND_M: [f64; 2] = [0.1, 1.8];
 
 /// Surfaces that were seen, sampled, with where the sensor was.
-struct Scene {
+pub(super) struct Scene {
     voxel_m: f64,
-    voxels: BTreeSet<[i32; 3]>,
-    places_m: Vec<[f64; 3]>,
+    pub(super) voxels: BTreeSet<[i32; 3]>,
+    pub(super) places_m: Vec<[f64; 3]>,
     /// Columns of walls.
-    walls: BTreeSet<[i32; 2]>,
+    pub(super) walls: BTreeSet<[i32; 2]>,
     /// Columns of the floor.
-    floor: BTreeSet<[i32; 2]>,
+    pub(super) floor: BTreeSet<[i32; 2]>,
     /// The state of a generator of noise.
     noise: u64,
 }
 
 impl Scene {
-    fn new(voxel_m: f64) -> Self {
+    pub(super) fn new(voxel_m: f64) -> Self {
         let (voxels, places_m, walls, floor) = Default::default();
         Self { voxel_m, voxels, places_m, walls, floor, noise: 1 }
     }
@@ -53,7 +53,7 @@ impl Scene {
     }
 
     /// A floor between two corners, at a height each of `height_m`.
-    fn floor(&mut self, low_m: [f64; 2], high_m: [f64; 2], height_m: impl Fn(f64, f64) -> f64) {
+    pub(super) fn floor(&mut self, low_m: [f64; 2], high_m: [f64; 2], height_m: impl Fn(f64, f64) -> f64) {
         for (x, y) in samples(low_m, high_m) {
             let z = height_m(x, y) + self.noise_m();
             let column = self.point([x, y, z]);
@@ -62,7 +62,7 @@ impl Scene {
     }
 
     /// An upright wall along a line, from a height on, 2.5 m high.
-    fn wall(&mut self, from_m: [f64; 2], to_m: [f64; 2], foot_m: f64) {
+    pub(super) fn wall(&mut self, from_m: [f64; 2], to_m: [f64; 2], foot_m: f64) {
         for (x, y) in samples(from_m, to_m) {
             for step in 0..100 {
                 let column = self.point([x, y, foot_m + 0.025 * f64::from(step)]);
@@ -71,7 +71,7 @@ impl Scene {
         }
     }
 
-    fn map(&self, levels: u32) -> MultiResolutionMap {
+    pub(super) fn map(&self, levels: u32) -> MultiResolutionMap {
         let voxels: VoxelSet = self.voxels.iter().filter_map(|&index| VoxelKey::new(index)).collect();
         let robot = RobotName::new("robot").unwrap();
         let pose = |place_m: &[f64; 3]| Pose::translation(place_m[0], place_m[1], place_m[2]);
@@ -85,7 +85,7 @@ impl Scene {
     }
 
     /// The cells of walls that are not occupied, and those of the floor that are, of columns away from walls.
-    fn wrong(&self) -> (usize, usize) {
+    pub(super) fn wrong(&self) -> (usize, usize) {
         let grid = grid_of(&self.map(1), self.voxel_m).unwrap();
         let is_occupied = |column: &[i32; 2]| occupied_at(&grid, *column);
         let beside_wall =
@@ -105,7 +105,7 @@ fn samples(low_m: [f64; 2], high_m: [f64; 2]) -> impl Iterator<Item = (f64, f64)
     along(1).flat_map(move |y| along(0).map(move |x| (x, y)))
 }
 
-fn request(band_m: [f64; 2], band_from: BandFrom, cell_m: f64) -> GridRequest {
+pub(super) fn request(band_m: [f64; 2], band_from: BandFrom, cell_m: f64) -> GridRequest {
     let area = GridArea::Rectangle { min_m: [-12.0; 2], max_m: [12.0; 2] };
     GridRequest { level: 0, area, band_m, band_from, cell_m, tells_unknown: false, cells_max: 1 << 22 }
 }
@@ -121,7 +121,7 @@ fn occupied_at(grid: &Grid, column: [i32; 2]) -> bool {
 }
 
 /// A room from -5 to 5 m, with walls around and a robot's way through, at a height.
-fn room(scene: &mut Scene, height_m: impl Fn(f64, f64) -> f64) {
+pub(super) fn room(scene: &mut Scene, height_m: impl Fn(f64, f64) -> f64) {
     scene.floor([-5.0, -4.0], [5.0, 4.0], &height_m);
     for [from, to] in [[[-5.0, -4.0], [5.0, -4.0]], [[-5.0, 4.0], [5.0, 4.0]]] {
         for step in 0..40 {
@@ -136,7 +136,7 @@ fn room(scene: &mut Scene, height_m: impl Fn(f64, f64) -> f64) {
 }
 
 /// Voxels of a building, of a yard and of a street, meters.
-const VOXELS_M: [f64; 3] = [0.05, 0.1, 0.2];
+pub(super) const VOXELS_M: [f64; 3] = [0.05, 0.1, 0.2];
 
 #[test]
 fn above_a_flat_floor_walls_are_occupied_and_the_floor_is_not() {

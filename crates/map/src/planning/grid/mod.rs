@@ -5,6 +5,8 @@ mod cells;
 mod extent;
 mod floor;
 #[cfg(test)]
+mod floor_misled;
+#[cfg(test)]
 mod floor_scenes;
 mod free;
 mod keep_outs;

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::height::Floor;
-use super::regions::{Region, Regions, SQUARE_M};
+use super::regions::{Region, Regions, SQUARE_M, SQUARES_MIN};
 use super::surfaces::Surfaces;
 use crate::geometry::translation_m;
 use crate::map::{MultiResolutionMap, PausingView};
@@ -16,6 +16,10 @@ use crate::util::StopSignal;
 const SEARCHED_M: f64 = 5.0;
 /// Most columns that these are: of voxels below 4 cm.
 const SEARCHED_MAX: i32 = 128;
+/// Storeys lie at least so far above each other, meters: what lies lower above a larger floor stands on that.
+const STOREY_MIN_M: f64 = 2.0;
+/// Side of squares by which it is told whether a floor is near, meters: what stands on a floor hides less of it.
+const NEAR_M: f64 = 2.0;
 
 /// The floor that the band of a request counts from; none where it counts from the map's z = 0 or has no bounds.
 ///
@@ -51,7 +55,7 @@ pub fn find_floor(
     };
     let mut regions = Regions::new(&surfaces, voxel_m);
     for place_m in &places_m {
-        if !pause() {
+        if !pause() || regions.is_ended {
             break;
         }
         visit(*place_m, voxel_m, &surfaces, &mut regions, &mut pause);
@@ -62,10 +66,11 @@ pub fn find_floor(
         return Err(GridError::NoFloor { places: places_m.len() });
     }
     floors.sort_by_key(|region| std::cmp::Reverse(region.visits));
-    let tops = floors.iter().flat_map(|region| &region.surfaces);
+    let tops = apart(&floors, &surfaces, voxel_m);
     let view = view.view();
-    let columns =
-        tops.map(|surface| (surfaces.voxel(*surface), surfaces.foot(view, request.level, *surface)));
+    let columns = tops
+        .into_iter()
+        .map(|surface| (surfaces.voxel(surface), surfaces.foot(view, request.level, surface)));
     Ok(Some(Arc::new(Floor::of(voxel_m, columns, stop))))
 }
 
@@ -93,14 +98,66 @@ fn visit(
     let [x, y, z] = place_m.map(|c| (c / voxel_m).floor() as i32);
     let searched = ((SEARCHED_M / voxel_m).ceil() as i32).clamp(1, SEARCHED_MAX);
     for column in (0..=searched).flat_map(|distance| ring([x, y], distance)) {
-        let below = surfaces.of_column(column).take_while(|surface| surfaces.voxel(*surface)[2] < z).last();
-        let Some(surface) = below else { continue };
-        let region = regions.region_of(surface, pause);
-        if regions.all[region].is_floor() {
+        if let Some(region) = floor_of_column(column, z, voxel_m, surfaces, regions, pause) {
             regions.all[region].visits += 1;
             return;
         }
+        if regions.is_ended {
+            return;
+        }
     }
+}
+
+/// The region of the floor in a column, below the voxel `z`: the highest that is one. Less than a storey below it the
+/// larger one counts: what a driving robot sees of itself, and tables in a row, have more than 4 m², too.
+fn floor_of_column(
+    column: [i32; 2],
+    z: i32,
+    voxel_m: f64,
+    surfaces: &Surfaces,
+    regions: &mut Regions<'_>,
+    pause: &mut impl FnMut() -> bool,
+) -> Option<usize> {
+    let below = surfaces.of_column(column).take_while(|surface| surfaces.voxel(*surface)[2] < z);
+    let mut found: Option<(usize, i32)> = None;
+    for surface in below.collect::<Vec<_>>().into_iter().rev() {
+        let level = surfaces.voxel(surface)[2];
+        if found.is_some_and(|(_, above)| f64::from(above - level) * voxel_m >= STOREY_MIN_M) {
+            break;
+        }
+        let region = regions.region_of(surface, pause);
+        if regions.is_ended {
+            return None;
+        }
+        let size = |region: usize| regions.all[region].surfaces.len();
+        if regions.all[region].is_floor() && found.is_none_or(|(other, _)| size(region) > size(other)) {
+            found = Some((region, found.map_or(level, |(_, highest)| highest)));
+        }
+    }
+    found.map(|(region, _)| region)
+}
+
+/// The surfaces of floors, those first that were visited most. Of a floor that lies above or below one before it, only
+/// what is far from that: where something stands on a floor or hides it, a storey above is not the floor.
+fn apart(floors: &[Region], surfaces: &Surfaces, voxel_m: f64) -> Vec<u32> {
+    let square = |column: [i32; 2]| column.map(|i| (f64::from(i) * voxel_m / NEAR_M).floor() as i64);
+    let (mut kept, mut columns, mut squares) = (Vec::new(), HashSet::new(), HashSet::new());
+    for region in floors {
+        let of_region = || region.surfaces.iter().map(|surface| (*surface, surfaces.column_of(*surface)));
+        let shared = of_region().filter(|(_, column)| columns.contains(column)).count();
+        let is_other_storey = shared as f64 * voxel_m * voxel_m >= SQUARES_MIN as f64 * SQUARE_M * SQUARE_M;
+        let is_near = |column: [i32; 2]| {
+            let [x, y] = square(column);
+            (-1..=1).any(|dy| (-1..=1).any(|dx| squares.contains(&[x + dx, y + dy])))
+        };
+        let new: Vec<_> = of_region()
+            .filter(|(_, column)| !columns.contains(column) && !(is_other_storey && is_near(*column)))
+            .collect();
+        columns.extend(new.iter().map(|(_, column)| *column));
+        squares.extend(new.iter().map(|(_, column)| square(*column)));
+        kept.extend(new.into_iter().map(|(surface, _)| surface));
+    }
+    kept
 }
 
 /// The columns on the border of the square that reaches so far from a column.

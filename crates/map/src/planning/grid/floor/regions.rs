@@ -21,7 +21,7 @@ const FOLLOWED_MAX: usize = 32;
 pub(super) const SQUARE_M: f64 = 0.5;
 /// Least number of squares of a region that is a floor: 4 square meters. A desk, a roof of a car, the deck of a robot
 /// and the head of a person have less, rooms and lanes have more.
-const SQUARES_MIN: usize = 16;
+pub(super) const SQUARES_MIN: usize = 16;
 /// Columns between two pauses.
 const COLUMNS_PER_PAUSE: usize = 4096;
 
@@ -74,13 +74,17 @@ pub(super) struct Regions<'a> {
     followed: usize,
     links: Vec<Link>,
     pub(super) all: Vec<Region>,
+    /// Columns that were looked at, of all regions.
+    looked: usize,
+    /// True once the search was ended.
+    pub(super) is_ended: bool,
 }
 
 impl<'a> Regions<'a> {
     pub(super) fn new(surfaces: &'a Surfaces, voxel_m: f64) -> Self {
         let followed = ((FOLLOWED_M / voxel_m).round() as usize).clamp(1, FOLLOWED_MAX);
         let links = vec![Link { region: NONE, before: NONE, columns: 0 }; surfaces.len()];
-        Self { surfaces, voxel_m, followed, links, all: Vec::new() }
+        Self { surfaces, voxel_m, followed, links, all: Vec::new(), looked: 0, is_ended: false }
     }
 
     /// The number of the region that a surface belongs to, which spreads from there where it belongs to none yet.
@@ -106,10 +110,10 @@ impl<'a> Regions<'a> {
         self.take(seed, Link { region, before: seed, columns: 0 });
         reached.insert(self.surfaces.column_of(seed), Reached { gap: 0, from: seed });
         waiting[0].push_back(self.surfaces.column_of(seed));
-        let mut looked = 0;
         while let Some(gap) = waiting.iter().position(|columns| !columns.is_empty()) {
-            looked += 1;
-            if looked % COLUMNS_PER_PAUSE == 0 && !pause() {
+            self.looked += 1;
+            if self.looked.is_multiple_of(COLUMNS_PER_PAUSE) && !pause() {
+                self.is_ended = true;
                 return;
             }
             let Some(column) = waiting[gap].pop_front() else { continue };
