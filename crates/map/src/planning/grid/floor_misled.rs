@@ -44,7 +44,7 @@ fn what_a_robot_sees_of_itself_along_its_way_is_no_floor() {
         let floor = scene.floor.clone();
         // Its deck, over all of its way.
         scene.floor([-4.5, -0.3], [4.5, 0.3], |_, _| 0.85);
-        let deck = |[_, y]: &[i32; 2]| ((f64::from(*y) + 0.5) * voxel_m).abs() < 0.3;
+        let deck = |[_, y]: &[i32; 2]| ((f64::from(*y) + 0.5) * voxel_m).abs() < 0.3 + voxel_m;
         scene.floor = floor.iter().filter(|column| !deck(column)).copied().collect();
         scene.wall([2.0, 2.0], [2.4, 2.0], 0.0);
         assert_eq!(scene.wrong(), (0, 0), "voxels of {voxel_m} m");
