@@ -84,6 +84,14 @@ impl DrawGrid {
             return Err(CliError::failed(message));
         }
         let description = write_files(&grid, &out)?;
+        if grid.floor_m.is_some() {
+            let voxel_m = client.map_info(&map.name).await?.settings.resolution_m
+                * f64::from(1 << question.asked.level);
+            let low_m = 2.0 * voxel_m;
+            output.note(format!(
+                "what is lower than {low_m:.2} m above the floor, two voxels, may be taken for floor"
+            ));
+        }
         output.print(&Drawn::of(&grid, &out, &description, versions.map(|version| version.revision)))
     }
 }

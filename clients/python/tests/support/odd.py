@@ -79,7 +79,7 @@ def error_of(call: Callable[[], object]) -> mrol.MrolError | None:
 
 
 def must_be_named(call: Callable[[], object], names: str, odd: str) -> None:
-    """What cannot be sent is refused by a word that names the argument; the server, or a map in this process, refuses what can be."""
+    """What cannot be sent is refused by a word that names the argument; the server, or a map in this process, the rest."""
     error = error_of(call)
     if isinstance(error, mrol.ArgumentError):
         assert re.match(names, error.argument), (odd, error)
