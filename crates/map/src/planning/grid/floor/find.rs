@@ -151,7 +151,7 @@ fn apart(floors: &[Region], surfaces: &Surfaces, voxel_m: f64) -> Vec<u32> {
             (-1..=1).any(|dy| (-1..=1).any(|dx| squares.contains(&[x + dx, y + dy])))
         };
         let new: Vec<_> = of_region()
-            .filter(|(_, column)| !columns.contains(column) && !(is_other_storey && is_near(*column)))
+            .filter(|(_, column)| !(columns.contains(column) || is_other_storey && is_near(*column)))
             .collect();
         columns.extend(new.iter().map(|(_, column)| *column));
         squares.extend(new.iter().map(|(_, column)| square(*column)));
