@@ -25,8 +25,8 @@ pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) ->
     [of_scan, of_map].into_iter().any(|side| expected_share(side) >= AGREEMENT_MIN)
 }
 
-/// The share that agrees of further points like those of a side: (a + 1) / (a + c + 2) after a that agree and c that are
-/// contradicted (Laplace's rule of succession), where points beside each other count as fewer, see [`CLUSTERING`].
+/// The share that agrees of further points like those of a side: (a + 1) / (a + c + 2) after a that agree and c that
+/// are contradicted (Laplace's rule of succession), where points beside each other count as fewer, see [`CLUSTERING`].
 fn expected_share(side: &RayCounts) -> f64 {
     let independent = |points: usize| points as f64 / (CLUSTERING * CLUSTERING);
     let (agree, contradicted) = (independent(side.agree), independent(side.contradicted));
