@@ -49,16 +49,21 @@ impl<'a> PausingView<'a> {
     /// Lets others go first, where some wait and this work has had its part: to be called between the parts of long
     /// work.
     pub fn give_way(&mut self, stop: StopSignal<'_>) {
-        if !stop.is_way_due() {
-            return;
+        if stop.is_way_due() {
+            self.let_go_during(|| stop.give_way());
         }
+    }
+
+    /// Lets go of the map during `work`, which does not read it: changes go on meanwhile. Then the view is the newest.
+    pub fn let_go_during<A>(&mut self, work: impl FnOnce() -> A) -> A {
         let (map, is_long) = (self.map(), self.long_read.is_some());
         let (keep_outs, viewpoints) = (self.view.keep_outs().is_some(), self.view.viewpoints().is_some());
         self.view.let_go();
         self.long_read = None;
-        stop.give_way();
+        let done = work();
         self.long_read = is_long.then(|| map.long_read());
         self.view = view_of(map, keep_outs, viewpoints);
+        done
     }
 
     fn map(&self) -> &'a MultiResolutionMap {

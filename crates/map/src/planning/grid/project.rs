@@ -14,10 +14,10 @@ use crate::util::StopSignal;
 /// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each
 /// voxel lies in one cell. Voxels of the band are those that reach into it: that have more than a border in common with
 /// it, however little, and of a band that is thinner than a voxel those that hold it. So no obstacle is passed over
-/// because the center of its voxel lies above or below, at whatever level.
+/// because the center of its voxel lies above or below.
 ///
-/// Heights count from z = 0 of the map, or in each column of voxels from the floor there ([`find_floor`]). What lies
-/// below the floor, as the bottom of a pit or of stairs that lead down, is in no such band that begins above it, and is
+/// Heights count from z = 0 of the map, or in each column of voxels from the floor there ([`find_floor`]). Then what is
+/// lower than two voxels of the level may be taken for floor. What lies below the floor, as the bottom of a pit or of stairs that lead down, is in no such band that begins above it, and is
 /// not drawn.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied

@@ -25,9 +25,9 @@ const NEAR_M: f64 = 2.0;
 ///
 /// It is found below the viewpoints of the map, or in a map without any below the poses of its trajectory: there the
 /// surface of the nearest column counts that is highest below the pose, where a region of 4 m² at least spreads from
-/// it. So neither a table below a sensor nor what it sees of its robot is a floor, and of storeys above each other
-/// those are where robots were. Where robots were on two floors above each other, the one counts on which they were
-/// in more places.
+/// it, or a larger one less than a storey below. So a desk below a sensor is no floor, nor is what it sees of its robot
+/// if the floor below was seen. Where robots were on two floors above each other, the one counts on which they were in
+/// more places, and the other one only away from it.
 ///
 /// Reads all voxels of the level and takes some 70 bytes a surface meanwhile. Others go first between its parts. Once
 /// stopped, the floor lacks parts.
@@ -49,19 +49,8 @@ pub fn find_floor(
     }
     let surfaces = Surfaces::of(view, request.level, stop);
     let voxel_m = view.lattice().resolution_m(request.level);
-    let mut pause = || {
-        view.give_way(stop);
-        !stop.is_stopped()
-    };
-    let mut regions = Regions::new(&surfaces, voxel_m);
-    for place_m in &places_m {
-        if !pause() || regions.is_ended {
-            break;
-        }
-        visit(*place_m, voxel_m, &surfaces, &mut regions, &mut pause);
-    }
-    let mut floors: Vec<Region> = regions.all;
-    floors.retain(|region| region.visits > 0);
+    // What is left to do reads the surfaces alone, and may take until the time is up.
+    let mut floors = view.let_go_during(|| visited(&places_m, voxel_m, &surfaces, stop));
     if floors.is_empty() && !stop.is_stopped() {
         return Err(GridError::NoFloor { places: places_m.len() });
     }
@@ -85,6 +74,26 @@ fn places_m(map: &MultiResolutionMap) -> Vec<[f64; 3]> {
         return poses.filter(is_new).collect();
     }
     map.trajectory().poses().map(|scan| translation_m(&scan.map_from_sensor)).filter(is_new).collect()
+}
+
+/// The regions of which some are below places, each with how many.
+fn visited(places_m: &[[f64; 3]], voxel_m: f64, surfaces: &Surfaces, stop: StopSignal<'_>) -> Vec<Region> {
+    let mut pause = || {
+        if stop.is_way_due() {
+            stop.give_way();
+        }
+        !stop.is_stopped()
+    };
+    let mut regions = Regions::new(surfaces, voxel_m);
+    for place_m in places_m {
+        if !pause() || regions.is_ended {
+            break;
+        }
+        visit(*place_m, voxel_m, surfaces, &mut regions, &mut pause);
+    }
+    let mut floors = regions.all;
+    floors.retain(|region| region.visits > 0);
+    floors
 }
 
 /// Notes the floor below a place.
