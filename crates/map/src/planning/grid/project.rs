@@ -17,8 +17,8 @@ use crate::util::StopSignal;
 /// because the center of its voxel lies above or below.
 ///
 /// Heights count from z = 0 of the map, or in each column of voxels from the floor there ([`find_floor`]). Then what is
-/// lower than two voxels of the level may be taken for floor. What lies below the floor, as the bottom of a pit or of stairs that lead down, is in no such band that begins above it, and is
-/// not drawn.
+/// lower than two voxels of the level may be taken for floor. What lies below the floor, as the bottom of a pit or of
+/// stairs that lead down, is in no such band that begins above it, and is not drawn.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied
 /// too; they have no top, and make no grid larger that is as large as what is there.
