@@ -25,6 +25,12 @@ pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) ->
     [of_scan, of_map].into_iter().any(|side| expected_share(side) >= AGREEMENT_MIN)
 }
 
+/// True of a pose at which the scan and earlier scans saw enough of each other, and most of what is known of either side
+/// agrees.
+pub(crate) fn agrees_both_ways(agreement: &RayAgreement) -> bool {
+    has_evidence(agreement) && agreement.worse() >= AGREEMENT_MIN
+}
+
 /// The share that agrees of further points like those of a side: (a + 1) / (a + c + 2) after a that agree and c that
 /// are contradicted (Laplace's rule of succession), where points beside each other count as fewer, see [`CLUSTERING`].
 fn expected_share(side: &RayCounts) -> f64 {

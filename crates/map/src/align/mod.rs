@@ -56,6 +56,7 @@ mod verdict;
 mod witnesses;
 
 pub use agreement::{RayAgreement, RayCounts, Rival};
+pub(crate) use evidence::agrees_both_ways;
 pub use information::{Direction, PoseInformation};
 pub use look::ray_agreement;
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};

@@ -40,6 +40,8 @@ pub(super) struct LostSince {
 pub(super) struct LostRobot {
     /// Points of its last scan, sensor frame, meters.
     pub(super) points: Arc<[Point]>,
+    /// When that was taken, nanoseconds since the Unix epoch.
+    pub(super) timestamp_ns: Option<i64>,
     /// Where its refused scans lead, one aligned to the other: map_from_sensor of the last one.
     pub(super) chained: Pose,
     /// Where a search saw it, moved on by its motion since: map_from_sensor of its last scan.
@@ -50,8 +52,7 @@ pub(super) struct LostRobot {
 struct Lost {
     robot: LostRobot,
     since: LostSince,
-    /// When its last scan was taken, nanoseconds since the Unix epoch, and which way was down.
-    timestamp_ns: Option<i64>,
+    /// Which way was down at its last scan.
     gravity: Option<Gravity>,
     noted_at: Instant,
     /// Searches begun for this robot.
@@ -140,11 +141,11 @@ impl LostRobots {
         let mut all = self.0.lock();
         all.robots.retain(|_, lost| !lost.is_forgotten());
         if let Some(lost) = all.robots.get_mut(robot).filter(|lost| lost.since == since) {
-            (lost.timestamp_ns, lost.gravity) = (timestamp_ns, gravity);
+            lost.gravity = gravity;
             let moved = |pose: Pose| motion.map(|motion| pose * motion);
             let place = lost.robot.place.filter(|_| !scan.is_not_in_place).and_then(moved);
             let chained = moved(lost.robot.chained).unwrap_or(lost.robot.chained);
-            lost.robot = LostRobot { points, chained, place };
+            lost.robot = LostRobot { points, timestamp_ns, chained, place };
             lost.noted_at = Instant::now();
             if let Some(search) = &mut lost.under_way {
                 search.since = search.since.and_then(moved);
@@ -161,9 +162,8 @@ impl LostRobots {
         }
         let lost = Lost {
             since,
-            timestamp_ns,
             gravity,
-            robot: LostRobot { points, chained: probable_pose, place: None },
+            robot: LostRobot { points, timestamp_ns, chained: probable_pose, place: None },
             noted_at: Instant::now(),
             searches: 0,
             searched_at: None,
@@ -194,7 +194,7 @@ impl LostRobots {
         lost.searched_at = Some(Instant::now());
         lost.under_way = Some(UnderWay { number: *searches, since: Some(Pose::identity()) });
         let (number, points) = (*searches, Arc::clone(&lost.robot.points));
-        let (of_robot, timestamp_ns, gravity) = (lost.searches, lost.timestamp_ns, lost.gravity);
+        let (of_robot, timestamp_ns, gravity) = (lost.searches, lost.robot.timestamp_ns, lost.gravity);
         drop(all);
         let query = query(of_robot, timestamp_ns, gravity);
         Some(SearchTask { number, robot: robot.clone(), points, query })

@@ -33,7 +33,13 @@ impl ScanMapper<'_> {
     /// Seconds since the robot's last good pose; none where a time is not known.
     fn seconds_since_last(&self, scan: &Scan<'_>) -> Option<f64> {
         let (_, last_ns) = last_seen(scan.robot, &self.map.trajectory(), self.sightings)?;
-        let elapsed_ns = scan.timestamp_ns?.checked_sub(last_ns?).filter(|ns| *ns > 0)?;
-        Some(elapsed_ns as f64 * 1e-9)
+        seconds_between(last_ns, scan.timestamp_ns)
     }
+}
+
+/// Seconds from one time to a later one, nanoseconds since the Unix epoch; none where one is not known, or none is
+/// later.
+pub(super) fn seconds_between(before_ns: Option<i64>, now_ns: Option<i64>) -> Option<f64> {
+    let elapsed_ns = now_ns?.checked_sub(before_ns?).filter(|ns| *ns > 0)?;
+    Some(elapsed_ns as f64 * 1e-9)
 }

@@ -1,15 +1,13 @@
 //! The motion between two scans, by aligning one to the other.
 
-use crate::align::{AlignmentSettings, PoseCovariance, PosePrior, Rival, Verdict, align_until};
+use crate::align::{
+    AlignmentSettings, PoseCovariance, PosePrior, Rival, Verdict, agrees_both_ways, align_until,
+};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, ViewpointRecord};
 use crate::util::StopSignal;
 use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 
-/// How far a robot moves between two scans, and turns: one standard deviation. What was found is only a guess, which
-/// the map has to confirm.
-const MOVED_M: f64 = 0.5;
-const MOVED_DEG: f64 = 9.0;
 /// What is further away is seen up to here, meters.
 const RANGE_MAX_M: f32 = 60.0;
 
@@ -17,10 +15,12 @@ const RANGE_MAX_M: f32 = 60.0;
 /// the one does not align to the other.
 ///
 /// Both are points in the sensor frame, meters. The scan `before` is a map of its own, with the levels of `settings`;
-/// the sensor is thought to have stood still.
+/// the sensor is thought to have stood still, or to be off that as `expected` says. What is found is only a guess,
+/// which the map has to confirm.
 pub(super) fn motion_between(
     before: &[Point],
     now: &[Point],
+    expected: Option<PoseCovariance>,
     settings: &MapSettings,
     alignment: &AlignmentSettings,
     stop: StopSignal<'_>,
@@ -32,15 +32,15 @@ pub(super) fn motion_between(
     let viewpoint = image.map(|image| ViewpointRecord { image, displaced: Vec::new() });
     let record = ScanRecord::of_points(taken_at, before, map.lattice());
     map.committer().insert_scan(ScanRecord { viewpoint, ..record });
-    let expected = Some(PoseCovariance::isotropic(MOVED_M, MOVED_DEG.to_radians()));
-    let prior = PosePrior { expected, ..Pose::identity().into() };
+    let prior = PosePrior { expected, may_have_turned: false, ..Pose::identity().into() };
     let found = align_until(&map, now, &prior, alignment, stop);
-    // Nobody says that the sensor stood still: that it may have is no doubt about what was found.
+    // Nobody says that the sensor stood still: that it may have, or has moved far, is no doubt about what was found.
     let may_have_stood = |rivals: &[Rival]| matches!(rivals, [rival] if rival.map_from_sensor == prior.guess);
     let is_found = match found.verdict {
         Verdict::Accepted => true,
         Verdict::Ambiguous => may_have_stood(&found.rivals),
-        Verdict::LowOverlap | Verdict::Undetermined | Verdict::Contradicted => false,
+        Verdict::Contradicted => found.agreement.as_ref().is_some_and(agrees_both_ways),
+        Verdict::LowOverlap | Verdict::Undetermined => false,
     };
     (is_found && !stop.is_stopped()).then_some(found.map_from_sensor)
 }

@@ -16,6 +16,7 @@ use crate::mapping::recovery_settings::{Recovery, RecoverySettings};
 use crate::mapping::resolved_guess::last_seen;
 use crate::mapping::scan::Scan;
 use crate::mapping::scan_mapper::ScanMapper;
+use crate::mapping::scan_prior::seconds_between;
 use crate::util::StopSignal;
 use crate::voxel::volumetric_sample_until;
 
@@ -55,7 +56,10 @@ impl<'a> ScanMapper<'a> {
         let since = self.lost_since(scan);
         let before = recovery.lost.get(scan.robot, &since);
         let motion = before.as_ref().and_then(|before| {
-            motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
+            let expected = seconds_between(before.timestamp_ns, scan.timestamp_ns)
+                .map(|seconds| self.settings.odometry.after(seconds));
+            let alignment = &self.settings.alignment;
+            motion_between(&before.points, &kept, expected, self.map.settings(), alignment, stop)
         });
         let found = self.try_place(scan, before.as_ref(), motion.as_ref(), &points, stop);
         let found = match found {
