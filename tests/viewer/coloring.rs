@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::{Daemon, client, pose_json};
-use crate::{DRAWN, assert_clean, middle_color, text, turn, wall};
+use crate::{DRAWN, assert_clean, before_wall, middle_color, text, turn, wall};
 
 /// How many voxels of level 0 that are shown have a tag.
 const TAGGED: &str = "Array.from(session.forest.tiles()).filter((tile) => tile.level === 0).reduce((sum, tile) => sum + tile.words.filter((word) => word >>> 24).length, 0)";
@@ -71,6 +71,43 @@ async fn a_map_without_a_journal_says_that_older_scans_have_no_color() {
         .wait("document.getElementById('coloring-hint').textContent.includes('the server has no older ones')")
         .await;
     assert_eq!(browser.eval(TAGGED).await, 0);
+    assert_clean(&browser.told(), &daemon);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_without_room_for_who_brought_what_says_so() {
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
+    let small = "session.arrivals.tags = new session.arrivals.tags.constructor(1)";
+    browser.eval(small).await;
+    browser.press("#coloring [value=robot]").await;
+    browser.wait("document.getElementById('coloring-hint').textContent.includes('more voxels than this page keeps')").await;
+    let tagged = browser.eval(TAGGED).await.as_u64().unwrap();
+    assert!(tagged > 0 && tagged < 441, "{tagged}");
+    assert_clean(&browser.told(), &daemon);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn robots_keep_their_colors_and_ages_their_order_however_long_the_page_is_open() {
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
+    // Three robots for two hours, a scan of each every four seconds; each scan is followed by the tag it has by now.
+    let kept = "await (async () => {
+        const { Arrivals } = await import(new URL('viewer/arrivals.js', document.baseURI));
+        const { robotColor, rgba } = await import(new URL('viewer/palette.js', document.baseURI));
+        const arrivals = new Arrivals();
+        const scans = [];
+        const retag = (table) => scans.forEach((scan) => (scan.tag = table[scan.tag]));
+        for (let i = 0; i < 5400; i++) {
+            const robot = ['a', 'b', 'c'][i % 3];
+            const tag = arrivals.tagOf(robot, i + 1, Math.floor(i / 3) * 4000, retag);
+            scans.push({ robot, tag });
+        }
+        const isColored = scans.every(({ robot, tag }) =>
+            String(arrivals.colorOf(tag, false)) === String(rgba(robotColor(['a', 'b', 'c'].indexOf(robot)))));
+        const ages = scans.filter(({ robot }) => robot === 'a').map(({ tag }) => arrivals.colorOf(tag, true)[3]);
+        const isInOrder = ages.every((age, i) => i === 0 || age >= ages[i - 1]);
+        return [isColored, isInOrder, new Set(ages).size > 8, Math.max(...scans.map(({ tag }) => tag)) < 255];
+    })()";
+    assert_eq!(browser.eval(kept).await, json!([true, true, true, true]));
     assert_clean(&browser.told(), &daemon);
 }
 

@@ -61,6 +61,18 @@ async fn a_roof_that_hides_the_rooms_is_left_out_until_somebody_wants_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_help_opens_and_leads_to_what_this_server_has() {
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
+    browser.press("#open-help").await;
+    browser.wait("document.getElementById('help-dialog').open").await;
+    let links = "await Promise.all(Array.from(document.querySelectorAll('#help-dialog a'), async (link) => (await fetch(link.href)).status))";
+    assert_eq!(browser.eval(links).await, json!([200, 200]));
+    browser.press("#help-dialog button").await;
+    browser.wait("!document.getElementById('help-dialog').open").await;
+    assert_clean(&browser.told(), &daemon);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_map_without_a_roof_is_shown_whole() {
     let Some((_turn, browser, daemon)) = before_room(false).await else { return };
     assert_eq!(browser.eval("scene.cut.max[2] === Infinity").await, true);

@@ -32,15 +32,16 @@ export class Coloring {
 
   async #readPast(session, coloring) {
     byId("coloring-hint").textContent = "Reading which scans brought what is here.";
-    const said = await session.readPast().then((first) => saidOf(coloring, first, session.revision), (problem) => (session === this.#session && failed(problem), saidOf(coloring)));
+    const said = await session.readPast().then((first) => saidOf(coloring, first, session), (problem) => (session === this.#session && failed(problem), saidOf(coloring, undefined, session)));
     if (session !== this.#session || this.#scene.coloring !== coloring) return;
     byId("coloring-hint").textContent = said;
     this.#scene.repaint();
   }
 }
 
-function saidOf(coloring, first, revision) {
+function saidOf(coloring, first, { revision, arrivals }) {
   const by = coloring === "age" ? "The newest scans are the strongest in color, the oldest the palest." : "By the robot that saw a voxel first.";
+  if (arrivals.tags.isFull) return `${by} This map has more voxels than this page keeps scans of: others are gray.`;
   if (first === 1 || revision === 0) return by;
   const since = first === undefined ? "scans that came while this page was open: the server has no older ones of this map" : `scans since revision ${first}`;
   return `${by} Of ${since}; others are gray.`;

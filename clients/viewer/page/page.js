@@ -319,7 +319,7 @@ export class Page {
 
   #showAnswers() {
     const { session } = this;
-    if (!session) return;
+    if (!session?.areRobotsKnown) return;
     showAnswers(session, (position) => this.views.goTo(position));
     const size = Math.max(2 * session.forest.resolution, 0.05);
     const isShown = byId("show-refused").checked;
@@ -341,7 +341,8 @@ export class Page {
     if (!session) return;
     this.#showAnswers();
     const { robots, arrivals, keepOuts } = session;
-    const [isOfPaths, isOfRobots, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
+    const [isOfPaths, areRobotsShown, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
+    const isOfRobots = areRobotsShown && session.areRobotsKnown;
     scene.show("grid", isOfGrid && this.#bounds ? grid(this.#bulk).shape : undefined);
     scene.show("paths", isOfPaths ? paths(robots, arrivals) : undefined, true);
     const size = Math.max(2.5 * session.forest.resolution, 0.06);

@@ -11,6 +11,8 @@ import { Watch } from "./watch.js";
 
 export class Session {
   keepOuts = [];
+  /** The robots were read, or were tried to be. */
+  areRobotsKnown = false;
   #told;
   #watch;
   #isClosed = false;
@@ -85,13 +87,18 @@ export class Session {
     return this.#past;
   }
 
-  readRobots() {
-    return this.#reading(() => this.robots.load(), this.#told.robots);
+  async readRobots() {
+    await this.#reading(() => this.robots.load(), () => {
+      // In the order in which they came to the map, so that each has the same color in every page.
+      for (const name of this.robots.seen.keys()) this.arrivals.placeOf(name);
+    });
+    this.areRobotsKnown = true;
+    if (!this.#isClosed) this.#told.robots();
   }
 
   /** Where the robots are by now, those too whose scans change nothing. */
-  lookForRobots() {
-    return this.#reading(() => this.robots.look(), this.#told.robots);
+  async lookForRobots() {
+    if (this.areRobotsKnown) await this.#reading(() => this.robots.look(), this.#told.robots);
   }
 
   readKeepOuts() {

@@ -12,8 +12,15 @@ const RANGE = 1 << 16;
 const keyOf = (x, y, z) => ((x + RANGE) * 2 * RANGE + (y + RANGE)) * 2 * RANGE + (z + RANGE);
 
 export class Tags {
+  /** There was no room for the tags of some voxels. */
+  isFull = false;
   #blocks = new Map();
   #cells = new Uint8Array(SIDE ** 3);
+  #blocksMax;
+
+  constructor(blocksMax = BLOCKS_MAX) {
+    this.#blocksMax = blocksMax;
+  }
 
   /** Gives a tag to the voxels of these blocks; with `isOlder` only to those that have none. */
   put(bytes, tag, isOlder) {
@@ -64,10 +71,12 @@ export class Tags {
     eachBlock(bytes, (x, y, z, masks) => {
       const key = keyOf(x, y, z);
       let block = this.#blocks.get(key);
-      if (!block && isMade && this.#blocks.size < BLOCKS_MAX && [x, y, z].every((at) => Math.abs(at) < RANGE)) {
+      if (!block && !isMade) return;
+      if (!block) {
+        const hasRoom = this.#blocks.size < this.#blocksMax && [x, y, z].every((at) => Math.abs(at) < RANGE);
+        if (!hasRoom) return void (this.isFull = true);
         this.#blocks.set(key, (block = { x, y, z, tags: new Uint8Array(BLOCK_SIDE ** 3) }));
       }
-      if (!block) return;
       eachCube(masks, (cubeX, cubeY, cubeZ, bits) => {
         for (let i = 0; i < 8; i++) {
           if ((bits >> i) & 1) visit(block.tags, cubeX + (i & 1) + 8 * (cubeY + ((i >> 1) & 1)) + 64 * (cubeZ + (i >> 2)));
