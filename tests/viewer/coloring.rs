@@ -81,8 +81,8 @@ async fn a_page_without_room_for_who_brought_what_says_so() {
     browser.eval(small).await;
     browser.press("#coloring [value=robot]").await;
     browser.wait("document.getElementById('coloring-hint').textContent.includes('more voxels than this page keeps')").await;
-    let tagged = browser.eval(TAGGED).await.as_u64().unwrap();
-    assert!(tagged > 0 && tagged < 441, "{tagged}");
+    browser.wait(&format!("{TAGGED} > 0")).await;
+    browser.wait(&format!("{DRAWN} && {TAGGED} < 441")).await;
     assert_clean(&browser.told(), &daemon);
 }
 
