@@ -5,6 +5,7 @@ use std::fmt::Display;
 
 use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
+use super::stray::Stray;
 use mrol::console::CliError;
 use mrol::console::count;
 use mrol_service::MapInfo;
@@ -20,7 +21,7 @@ const ERROR_MAX_VOXELS: f64 = 5.0;
 pub(super) struct Checks(Vec<(bool, String)>);
 
 impl Checks {
-    pub(super) fn of(journal: &Journal, queries: &Told, info: &MapInfo) -> Self {
+    pub(super) fn of(journal: &Journal, queries: &Told, info: &MapInfo, stray: &Stray) -> Self {
         Self(vec![
             all_accepted(&journal.robots()),
             close_to_the_truth(&journal.robots(), info.settings.resolution_m),
@@ -29,6 +30,7 @@ impl Checks {
                 "the planner met occupied and free voxels".to_owned(),
             ),
             same_voxels(info.levels.first().map_or(0, |finest| finest.voxels), journal.voxels()),
+            (stray.is_refused(), stray.to_string()),
         ])
     }
 

@@ -15,6 +15,7 @@ use super::journal::Journal;
 use super::planner::Planner;
 use super::report::{Beginning, Line};
 use super::robot::Robot;
+use super::stray::Stray;
 use super::summary::Summary;
 use super::{explore, guide, robot};
 use mrol::console::CliError;
@@ -138,8 +139,9 @@ impl Demo {
         self.run_robots(robots, &serving, &map, |news| output.print(&journal.enter(news))).await?;
         let queries = planner.stop().await?;
 
+        let stray = Stray::send(operator, &map).await?;
         let info = operator.map_info(&map).await?;
-        let checks = Checks::of(&journal, &queries, &info);
+        let checks = Checks::of(&journal, &queries, &info, &stray);
         output.print(&Summary::new(&journal, &queries, &info, &checks))?;
         output.say(guide::text(&serving, self.once))?;
         Ok(checks)

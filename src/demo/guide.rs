@@ -7,7 +7,7 @@ pub(super) const MAP: &str = "demo";
 
 /// The link to the page that shows the demonstration's map.
 pub(crate) fn page(serving: &Serving) -> String {
-    format!("http://{}/#map={MAP}", serving.http)
+    format!("{}#map={MAP}", serving.page())
 }
 
 /// Commands that look around in the demonstration's daemon, and where to read on.

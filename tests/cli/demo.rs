@@ -21,6 +21,7 @@ fn the_demonstration_succeeds_and_tells_what_it_measured() {
         assert!(line["error_m"].as_f64().unwrap() < 0.1, "{line}");
     }
     let summary = &lines[9]["summary"];
+    // A cart's scan of another place was refused, or this would be a problem.
     assert_eq!(summary["problems"], serde_json::json!([]));
     assert!(summary["planner"]["points"].as_u64().unwrap() > 0);
     assert_eq!(summary["robots"]["camera"]["accepted"], 4);

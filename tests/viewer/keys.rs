@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::{Daemon, client, identity_json};
-use crate::{DRAWN, MIDDLE, assert_clean, link, text, turn, wall};
+use crate::{DRAWN, assert_clean, link, middle, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_key_is_asked_for_and_one_that_reads_deletes_nothing() {
@@ -37,7 +37,7 @@ async fn a_key_is_asked_for_and_one_that_reads_deletes_nothing() {
     browser.wait(&format!("{DRAWN} && scene.drawn.voxels === 441")).await;
 
     browser.press("[data-tool=region]").await;
-    browser.click(MIDDLE).await;
+    browser.click(middle(&browser).await).await;
     browser.press("#delete").await;
     browser.wait("document.getElementById('notices').textContent.includes('takes scope write')").await;
     let map: serde_json::Value =

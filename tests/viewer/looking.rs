@@ -4,19 +4,20 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::Daemon;
-use crate::{DRAWN, MIDDLE, assert_clean, before_wall, link, middle_color, shown, text, turn, wall};
+use crate::{DRAWN, assert_clean, before_wall, link, middle, middle_color, shown, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_map_is_turned_picked_cut_deleted_from_and_undone() {
     let Some((_turn, browser, daemon)) = before_wall().await else { return };
     assert_eq!(shown(&browser).await, 441);
     assert!(browser.eval("scene.drawn.calls").await.as_u64().unwrap() <= 64);
+    let at = middle(&browser).await;
     // The robot stands in the middle.
     browser.press("#show-robots").await;
     let wall_color = middle_color(&browser).await;
 
     // A click says which voxel it hit, and who saw it.
-    browser.click(MIDDLE).await;
+    browser.click(at).await;
     browser.wait("document.querySelector('#tool-panel dd')").await;
     let picked = text(&browser, "#tool-panel dl").await;
     assert!(picked.starts_with("voxel0, 0, 0") && picked.contains("level0"), "{picked}");
@@ -26,7 +27,7 @@ async fn a_map_is_turned_picked_cut_deleted_from_and_undone() {
 
     // A drag turns the camera: the middle stays what it is, the link follows.
     let yaw = browser.eval("scene.camera.yaw").await.as_f64().unwrap();
-    browser.drag(MIDDLE, [120.0, 0.0]).await;
+    browser.drag(at, [120.0, 0.0]).await;
     browser.wait(&format!("Math.abs(scene.camera.yaw - {yaw}) > 0.5")).await;
     browser.wait("location.hash.includes('yaw=-2.2')").await;
 
@@ -38,7 +39,7 @@ async fn a_map_is_turned_picked_cut_deleted_from_and_undone() {
 
     // A ball around the middle goes, with the color that was there, and comes back.
     browser.press("[data-tool=region]").await;
-    browser.click(MIDDLE).await;
+    browser.click(at).await;
     browser.press("#delete").await;
     browser.wait(&format!("{DRAWN} && scene.drawn.voxels < 441")).await;
     let (revision, left) = daemon.contents("a").await;
@@ -76,15 +77,16 @@ async fn what_lies_over_a_map_is_shown_and_asked_for() {
 
     // A body that stands in the wall does not fit; one that is small and before it does.
     browser.wait(DRAWN).await;
+    let at = middle(&browser).await;
     browser.press("[data-tool=body]").await;
-    browser.click(MIDDLE).await;
+    browser.click(at).await;
     browser.wait("document.querySelector('#tool-panel dl')").await;
     assert!(text(&browser, "#tool-panel dl").await.contains("does not fit"));
 
     // Two points of the wall are so far apart as they are.
     browser.press("[data-tool=ruler]").await;
-    browser.click(MIDDLE).await;
-    browser.click([MIDDLE[0] + 100.0, MIDDLE[1]]).await;
+    browser.click(at).await;
+    browser.click([at[0] + 100.0, at[1]]).await;
     browser.wait("document.querySelector('#tool-panel dl')").await;
     let apart = text(&browser, "#tool-panel dl").await;
     assert!(apart.contains("distance") && apart.contains(" cm"), "{apart}");

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod browser;
+mod coloring;
 mod figures;
 mod keys;
 mod live;
@@ -12,6 +13,7 @@ mod nothing_yet;
 mod pictures;
 #[path = "../support/mod.rs"]
 mod support;
+mod views;
 
 use browser::{Browser, Told};
 use serde_json::Value;
@@ -33,7 +35,7 @@ async fn shown(browser: &Browser) -> u64 {
     browser.eval("scene.drawn.voxels").await.as_u64().unwrap()
 }
 
-/// The color in the middle of the picture, as the GPU has it: red, green, blue.
+/// The color at the place that the camera looks at, as the GPU has it: red, green, blue.
 async fn middle_color(browser: &Browser) -> [u64; 3] {
     let read = "new Promise((resolve) => {
         let isRead = false;
@@ -42,7 +44,8 @@ async fn middle_color(browser: &Browser) -> [u64; 3] {
             isRead = true;
             const gl = document.getElementById('picture').getContext('webgl2');
             const color = new Uint8Array(4);
-            gl.readPixels(gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, color);
+            const [x, y] = scene.pageOf(scene.camera.target);
+            gl.readPixels(x, gl.drawingBufferHeight - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, color);
             resolve(Array.from(color));
         });
         scene.invalidate();
@@ -51,8 +54,10 @@ async fn middle_color(browser: &Browser) -> [u64; 3] {
     [color[0], color[1], color[2]]
 }
 
-/// The middle of the picture in the page.
-const MIDDLE: [f64; 2] = [450.0, 300.0];
+/// Where in the page the place is that the camera looks at: in the middle of what the panels leave.
+async fn middle(browser: &Browser) -> [f64; 2] {
+    serde_json::from_value(browser.eval("scene.pageOf(scene.camera.target)").await).unwrap()
+}
 
 /// A wall of 21 x 21 voxels of 0.1 m, in the plane y = 0 about the origin.
 fn wall() -> Vec<[f32; 3]> {

@@ -6,10 +6,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use base64::Engine;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::browser::Browser;
-use crate::support::daemon::client;
 use crate::turn;
 
 /// The demonstration, which goes on serving its map.
@@ -46,17 +45,6 @@ impl Drop for Demo {
     }
 }
 
-/// Half a cylinder, which is nowhere in the map.
-fn stray() -> Value {
-    let points: Vec<[f64; 3]> = (0..3000)
-        .map(|i| (f64::from(i) * 0.618).fract() * 3.1)
-        .enumerate()
-        .map(|(i, turn)| [1.2 * turn.cos(), 1.2 * turn.sin(), (i as f64 * 0.4142).fract() * 1.6 - 0.8])
-        .collect();
-    let guess = json!({"translation_m": [7.0, 4.6, 1.0], "rotation_xyzw": [0, 0, 0, 1]});
-    json!({"robot": "cart", "points": points, "guess": guess})
-}
-
 async fn picture(browser: &Browser, name: &str) {
     browser.wait("scene.drawn.is_complete").await;
     let taken = browser.call("Page.captureScreenshot", json!({"format": "webp", "quality": 85})).await;
@@ -71,18 +59,11 @@ async fn pictures() {
     let _turn = turn().await;
     let Some(browser) = Browser::start().await else { return };
     let demo = Demo::run();
-    let refused =
-        client().post(format!("{}/v1/maps/demo/scans", demo.http)).json(&stray()).send().await.unwrap();
-    let refused: Value = refused.json().await.unwrap();
-    assert_eq!(refused["accepted"], false, "{refused}");
     let size = json!({"width": 1280, "height": 760, "deviceScaleFactor": 1, "mobile": false});
     browser.call("Emulation.setDeviceMetricsOverride", size).await;
     browser.open(&format!("{}/#map=demo", demo.http)).await;
     browser.wait("scene.drawn.is_complete && scene.drawn.tiles > 0 && document.getElementById('attention').textContent").await;
-    // Without the ceiling, from near.
-    let cut = "(() => { const z = document.getElementById('cut-z-to'); z.value = 150; z.dispatchEvent(new Event('input'));
-                        scene.camera.distance *= 0.8; scene.camera.pitch = 0.85; scene.moved(); })()";
-    browser.eval(cut).await;
+    browser.wait("page.ceiling.range && scene.cut.max[2] < 3").await;
     picture(&browser, "viewer.webp").await;
     let dark = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
     browser.call("Emulation.setEmulatedMedia", dark).await;

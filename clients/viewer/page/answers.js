@@ -24,6 +24,13 @@ export function showAnswers({ robots, events, arrivals }, goTo) {
   byId("answers").replaceChildren(...newest.map((event) => answerItem(event, robotColor(arrivals.placeOf(event.robot)), goTo)));
 }
 
+/** The names of the robots that are seen, those first that need attention, and whether they do. */
+export function robotsByNeed({ robots, events }) {
+  const named = robots.names().map((name) => ({ name, seen: robots.seen.get(name), event: events.last.get(name) }));
+  const all = named.map((robot) => ({ ...robot, isBad: needsAttention(robot) }));
+  return all.sort((a, b) => b.isBad - a.isBad);
+}
+
 /** What is known of the last scan: of one from before the server's start, only where it was taken and its verdict. */
 const needsAttention = ({ event, seen }) => (event ? isBad(event) : seen.verdict !== "accepted");
 

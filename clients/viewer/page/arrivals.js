@@ -1,22 +1,27 @@
-// Which robot brought voxels, and when: of those that came while the page was open.
+// Which robot brought voxels, and when.
 //
-// A tag is one robot in one span of time. There are 254 of them; the oldest is forgotten for a new one.
+// A tag is the color of a robot and one of 31 spans of revisions: the first 15 are of scans from before the page was
+// opened, the others of those that came since. Where these are used up, two neighbors become one.
 
-import { Brought } from "./brought.js";
-import { rgba, robotColor, theme } from "./palette.js";
+import { ROBOT_COLORS, rgba, robotColor, theme } from "./palette.js";
+import { Tags } from "./tags.js";
 
-const TAGS = 254;
+const SPANS = 31;
+const PAST_SPANS = 15;
+/** At first; twice as long each time that spans are joined. */
 const SPAN_MS = 5_000;
-/** Bytes of blocks that are remembered, for tiles that are fetched only later. */
-const REMEMBERED_BYTES_MAX = 2 << 20;
-/** What is older than this has no color of its own by age. */
-const AGE_MAX_MS = 180_000;
+/** How much of its color the oldest voxel has by age. */
+const OLDEST_SHARE = 0.12;
 
 export class Arrivals {
-  #tags = new Map();
-  #next = 1;
+  tags = new Tags();
   #robots = new Map();
-  #brought = new Brought(REMEMBERED_BYTES_MAX);
+  /** Of each span the revision that it begins at. */
+  #begins = new Array(SPANS);
+  #live = PAST_SPANS;
+  #spanMs = SPAN_MS;
+  #spanAt = -Infinity;
+  #newest = 0;
 
   /** The place of a robot among those that were seen, which chooses its color. */
   placeOf(robot) {
@@ -24,37 +29,65 @@ export class Arrivals {
     return this.#robots.get(robot);
   }
 
-  /** The tag of what `robot` brings now; `forget(tag)` is called of a tag that is taken anew. */
-  tagOf(robot, now, forget) {
-    for (const [tag, span] of this.#tags) {
-      if (span.robot === robot && now - span.begin < SPAN_MS) return tag;
+  /** The tag of what `robot` brings now; `retag(table)` is called where tags become others. */
+  tagOf(robot, revision, now, retag) {
+    this.#newest = revision;
+    if (now - this.#spanAt >= this.#spanMs) {
+      if (this.#live === SPANS) this.#join(retag);
+      this.#begins[this.#live++] = revision;
+      this.#spanAt = now;
     }
-    const tag = this.#next;
-    this.#next = (tag % TAGS) + 1;
-    if (this.#tags.has(tag)) {
-      forget(tag);
-      this.#brought.forget(tag);
-    }
-    this.#tags.set(tag, { robot, begin: now });
-    return tag;
+    return this.#tag(robot, this.#live - 1);
   }
 
-  /** Remembers which voxels came with a tag. */
-  remember(blocks, tag) {
-    if (tag !== 0 && blocks.length > 0) this.#brought.push(blocks, tag);
+  /** The tag of what `robot` brought at a revision of the past, of which `first` to `last` are known. */
+  pastTagOf(robot, revision, first, last) {
+    const span = Math.floor((PAST_SPANS * (revision - first)) / (last - first + 1));
+    this.#begins[span] ??= revision;
+    this.#newest = Math.max(this.#newest, revision);
+    return this.#tag(robot, span);
   }
 
-  /** Tags what is remembered of a tile that was just fetched. */
-  tagIn(forest, tile) {
-    for (const { blocks, tag } of this.#brought) forest.tagIn(tile, blocks, tag);
+  /** Takes up what came and went with a change. */
+  take({ added, removed }, tag) {
+    this.tags.clear(removed);
+    if (tag !== 0) this.tags.put(added, tag, false);
   }
 
-  /** The color of a tag by robot or by age. */
-  colorOf(tag, isByAge, now) {
-    const span = this.#tags.get(tag);
-    if (!span) return undefined;
-    if (!isByAge) return rgba(robotColor(this.placeOf(span.robot)));
-    const age = Math.min((now - span.begin) / AGE_MAX_MS, 1);
-    return rgba(theme().accent, (1 - age) ** 0.7);
+  /** Takes up what a change of the past touched and removed: the first who brought a voxel is the one that counts. */
+  takePast({ added, removed }, tag) {
+    this.tags.clear(removed, (own) => (own - 1) % SPANS < PAST_SPANS);
+    if (tag !== 0) this.tags.put(added, tag, true);
+  }
+
+  /** The color of a tag by robot or by age: how late among the scans that are known. */
+  colorOf(tag, isByAge) {
+    if (tag > ROBOT_COLORS * SPANS) return undefined;
+    const span = (tag - 1) % SPANS;
+    if (!isByAge) return rgba(robotColor(Math.floor((tag - 1) / SPANS)));
+    const first = this.#begins.find((begin) => begin !== undefined);
+    if (this.#begins[span] === undefined) return undefined;
+    const share = (this.#begins[span] - first) / Math.max(1, this.#newest - first);
+    return rgba(theme().accent, OLDEST_SHARE + (1 - OLDEST_SHARE) * share ** 1.5);
+  }
+
+  #tag(robot, span) {
+    return 1 + (this.placeOf(robot) % ROBOT_COLORS) * SPANS + span;
+  }
+
+  /** Makes one of each two neighboring spans. */
+  #join(retag) {
+    const joined = (span) => (span < PAST_SPANS ? span : PAST_SPANS + ((span - PAST_SPANS) >> 1));
+    const table = Uint8Array.from({ length: 256 }, (_, tag) => {
+      if (tag === 0 || tag > ROBOT_COLORS * SPANS) return tag;
+      const span = (tag - 1) % SPANS;
+      return tag - span + joined(span);
+    });
+    for (let span = PAST_SPANS; span < SPANS; span += 2) this.#begins[joined(span)] = this.#begins[span];
+    this.#live = joined(SPANS - 1) + 1;
+    this.#begins.fill(undefined, this.#live);
+    this.#spanMs *= 2;
+    this.tags.retag(table);
+    retag(table);
   }
 }

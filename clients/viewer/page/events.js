@@ -64,9 +64,12 @@ export const isBad = ({ answer }) => !answer?.accepted || answer.verdict !== "ac
 /** The answer in a few words. */
 export function wordsOf({ answer, error }) {
   if (!answer) return error?.reason ?? "failed";
-  const overlap = `${Math.round(answer.overlap * 100)} %`;
-  if (!answer.accepted) return `${answer.verdict}, ${overlap}`;
-  if (answer.verdict !== "accepted") return `forced: ${answer.verdict}, ${overlap}`;
+  const share = `${Math.round(answer.overlap * 100)} %`;
+  const overlap = `overlap ${share}`;
+  // A verdict that names the overlap says of what the share is.
+  const verdict = answer.verdict.includes("overlap") ? `${answer.verdict} ${share}` : `${answer.verdict}, ${overlap}`;
+  if (!answer.accepted) return verdict;
+  if (answer.verdict !== "accepted") return `forced: ${verdict}`;
   if (answer.replayed) return `sent again, ${overlap}`;
   if (answer.recovered) return `found again, ${overlap}`;
   return answer.stationary ? `stands still, ${overlap}` : overlap;

@@ -1,6 +1,6 @@
 // The tiles of a map that are here: roots at its coarsest level, each tile over eight of the next finer one.
 
-import { eachBlock, eachCube, eachVoxel } from "./blocks.js";
+import { eachBlock, eachVoxel } from "./blocks.js";
 import { SIDE, Tile } from "./tile.js";
 
 /** Tiles that are kept; those of the coarsest level among them are never given up. */
@@ -129,22 +129,6 @@ export class Forest {
     });
     eachVoxel(added, (x, y, z) => {
       if (isIn(x, 0) && isIn(y, 1) && isIn(z, 2)) this.#insertAt(tile.level, x, y, z, revision, tag);
-    });
-  }
-
-  /** Tags the voxels of a tile that these blocks of level 0 brought. */
-  tagIn(tile, blocks, tag) {
-    const { level, index } = tile;
-    // A block lies in one cell of a coarse level, and in one tile of any.
-    const isIn = (block, axis) => block >> (level + 3) === index[axis];
-    eachBlock(blocks, (blockX, blockY, blockZ, masks) => {
-      if (!isIn(blockX, 0) || !isIn(blockY, 1) || !isIn(blockZ, 2)) return;
-      const cell = (block, within) => ((block * 8 + within) >> level) & 63;
-      eachCube(masks, (x, y, z, bits) => {
-        for (let i = 0; i < 8; i++) {
-          if ((bits >> i) & 1) tile.tag(cell(blockX, x + (i & 1)), cell(blockY, y + ((i >> 1) & 1)), cell(blockZ, z + (i >> 2)), tag);
-        }
-      });
     });
   }
 

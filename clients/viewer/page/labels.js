@@ -15,8 +15,8 @@ export class Labels {
     scene.whenDrawn(() => this.#place());
   }
 
-  /** Puts a label over a place; without a place it goes. */
-  put(name, place, text, color) {
+  /** Puts a label over a place; without a place it goes. Of labels that would cover each other the first is shown. */
+  put(name, place, text, { color, isBad = false } = {}) {
     const label = this.#labels.get(name);
     if (!place) {
       label?.shown.remove();
@@ -26,7 +26,8 @@ export class Labels {
     if (!label && this.#labels.size >= LABELS_MAX) return;
     const shown = label?.shown ?? this.#host.appendChild(element("span"));
     shown.replaceChildren(...(color ? [dot(color)] : []), text);
-    this.#labels.set(name, { shown, place });
+    shown.classList.toggle("bad", isBad);
+    this.#labels.set(name, { shown, place, size: [shown.offsetWidth, shown.offsetHeight] });
     this.#scene.invalidate();
   }
 
@@ -36,10 +37,14 @@ export class Labels {
   }
 
   #place() {
-    for (const { shown, place } of this.#labels.values()) {
+    const taken = [];
+    for (const { shown, place, size } of this.#labels.values()) {
       const at = this.#scene.pageOf(place);
-      shown.hidden = !at;
-      if (at) shown.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, -150%)`;
+      const isCovered = ([x, y, [width, height]]) => Math.abs(at[0] - x) < (size[0] + width) / 2 && Math.abs(at[1] - y) < (size[1] + height) / 2;
+      shown.hidden = !at || taken.some(isCovered);
+      if (shown.hidden) continue;
+      taken.push([...at, size]);
+      shown.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, -150%)`;
     }
   }
 }

@@ -1,15 +1,18 @@
 // The page: one map that is open, the tools, and the panel beside the picture.
 
 import { pathOf, requestId, send } from "./api.js";
-import { showAnswers } from "./answers.js";
+import { robotsByNeed, showAnswers } from "./answers.js";
 import { BodyTool } from "./body.js";
+import { Ceiling } from "./ceiling.js";
 import { Chooser, firstCommands, showEmpty } from "./chooser.js";
+import { Coloring } from "./coloring.js";
 import * as connection from "./connection.js";
 import { control } from "./controls.js";
-import { cutSliders } from "./cuts.js";
+import { Cuts } from "./cuts.js";
 import { button, byId, dot, element } from "./dom.js";
 import { freeSpace, frontiers } from "./explored.js";
 import { count, meters } from "./format.js";
+import { Help } from "./help.js";
 import { Labels } from "./labels.js";
 import { grid, keepOutShapes, paths, refusedScans, robotMarkers, scaleBar, topOf } from "./layers.js";
 import { cameraParts, placeCamera, readLink, writeLink } from "./link.js";
@@ -19,7 +22,9 @@ import { Picking, scanText } from "./picking.js";
 import { RegionTool, removeKeepOut } from "./region.js";
 import { Ruler } from "./ruler.js";
 import { Scene, STRAY } from "./scene.js";
+import { sayUnseen } from "./seen.js";
 import { Session } from "./session.js";
+import { Views } from "./views.js";
 
 const SCANS_SHOWN = 100;
 /** Lists and layers follow changes at most this often. */
@@ -28,7 +33,6 @@ const SECOND_MS = 1000;
 const LOOK_FOR_ROBOTS_MS = 5000;
 /** Heights above the lowest voxel between which free space is shown, meters. */
 const BAND_M = [0.2, 1.6];
-const PANEL_PIXELS = 290;
 const NARROW_PIXELS = 760;
 
 export class Page {
@@ -41,29 +45,35 @@ export class Page {
   #following;
   /** Which refused scans are drawn. */
   #refused;
-  #isFollowed = true;
   #opening = 0;
 
   constructor() {
     this.scene = new Scene(byId("picture"));
     this.labels = new Labels(this.scene, byId("labels"));
     this.chooser = new Chooser(this);
-    this.cuts = cutSliders((cut) => {
+    const chosen = () => this.#writeLink();
+    this.cuts = new Cuts((cut) => {
       this.scene.cut = cut;
       this.scene.moved();
+      this.ceiling?.say();
+      if (this.session) chosen();
     });
+    this.ceiling = new Ceiling(this.cuts, { pressed: chosen, measured: () => this.#followSoon() });
+    this.coloring = new Coloring(this.scene, chosen);
+    this.views = new Views(this.scene, { bounds: () => this.#left(), moved: chosen });
+    this.help = new Help();
     this.#tools = { pick: new Picking(this), ruler: new Ruler(this), region: new RegionTool(this), body: new BodyTool(this) };
     const moved = () => {
-      this.#isFollowed = false;
+      this.views.isFollowing = false;
       this.scene.moved();
       this.#writeLink();
     };
-    control(byId("picture"), this.scene.camera, { moved, clicked: (x, y) => this.#clicked(x, y) });
+    const pointAt = (x, y) => this.scene.pickAt(x, y)?.point;
+    control(byId("picture"), this.scene.camera, { moved, pointAt, clicked: (x, y) => this.#clicked(x, y) });
     this.#wire();
     this.useTool("pick");
     this.scene.whenDrawn(() => this.#drawn());
     whenThemeChanges(() => this.#showLayers());
-    setInterval(() => this.scene.coloring === "age" && this.scene.repaint(), SECOND_MS);
     setInterval(() => this.session && !document.hidden && this.session.lookForRobots(), LOOK_FOR_ROBOTS_MS);
     setInterval(() => document.hidden || this.#askForAnswers(), SECOND_MS);
   }
@@ -102,14 +112,13 @@ export class Page {
     const { scene } = this;
     scene.open(session.forest, session.loader, session.arrivals);
     this.#measure();
-    this.#isFollowed = !placeCamera(scene.camera, link);
-    if (this.#isFollowed) this.#frame();
-    byId("top").setAttribute("aria-pressed", scene.camera.isTop);
-    this.cuts.reset(this.#bounds);
+    this.views.open(placeCamera(scene.camera, link));
+    this.cuts.open(this.#bounds, link.cut);
+    this.ceiling.open(session, this.#bulk);
     const { levels } = session.info;
     byId("finest").max = levels.length - 1;
     this.#setFinest(Math.max(0, Math.min(Math.round(Number(link.level)) || 0, levels.length - 1)));
-    if (link.color) this.#setColoring(link.color);
+    this.coloring.open(session, link.color);
     session.follow();
     this.#askForAnswers();
     this.#follow();
@@ -119,8 +128,9 @@ export class Page {
   #close() {
     this.session?.close();
     this.session = undefined;
-    this.#bounds = undefined;
+    this.#bounds = this.#bulk = undefined;
     this.#refused = undefined;
+    this.ceiling.open(undefined);
     this.scene.open(undefined);
     this.labels.clear("");
     this.#tool?.closed();
@@ -196,13 +206,8 @@ export class Page {
 
   /** A scan as an entry of a list: a click leads there, and it can be undone. */
   scanItem(scan) {
-    const { camera } = this.scene;
     const text = scanText(scan);
-    const go = () => {
-      camera.target = scan.position ?? scan.map_from_sensor.translation_m;
-      this.#isFollowed = false;
-      this.scene.moved();
-    };
+    const go = () => this.views.goTo(scan.position ?? scan.map_from_sensor.translation_m);
     const target = scan.scan_id === null ? { revision: scan.revision } : { robot: scan.robot, session: scan.session, scan_id: scan.scan_id };
     const color = robotColor(this.session.arrivals.placeOf(scan.robot));
     return element("li", {}, dot(color), button(text, go, { className: "place", title: text }), button("Undo", () => this.undo(target)));
@@ -215,27 +220,11 @@ export class Page {
 
   #wire() {
     for (const shown of byId("tools").querySelectorAll("[data-tool]")) shown.addEventListener("click", () => this.useTool(shown.dataset.tool));
-    const { camera } = this.scene;
-    const top = () => {
-      camera.isTop = !camera.isTop;
-      byId("top").setAttribute("aria-pressed", camera.isTop);
-      this.scene.moved();
-      this.#writeLink();
-    };
-    const all = () => {
-      this.#frame();
-      this.#isFollowed = true;
-      this.scene.moved();
-      this.#writeLink();
-    };
-    byId("top").addEventListener("click", top);
-    byId("frame").addEventListener("click", all);
-    const actions = { t: top, f: all, 1: () => this.useTool("pick"), 2: () => this.useTool("ruler"), 3: () => this.useTool("region"), 4: () => this.useTool("body"), Escape: () => this.useTool("pick") };
+    const actions = { t: () => this.views.turnTop(), f: () => this.views.showAll(), c: () => this.ceiling.turn(), "?": () => this.help.open(), 1: () => this.useTool("pick"), 2: () => this.useTool("ruler"), 3: () => this.useTool("region"), 4: () => this.useTool("body"), Escape: () => this.useTool("pick") };
     addEventListener("keydown", (event) => {
       const isTyping = event.target instanceof HTMLInputElement && event.target.type !== "range" && event.target.type !== "checkbox";
       if (!isTyping && !event.ctrlKey && !event.metaKey && !byId("key-dialog").open) actions[event.key]?.();
     });
-    byId("coloring").addEventListener("change", (event) => (this.#setColoring(event.target.value), this.#writeLink()));
     byId("finest").addEventListener("input", (event) => (this.#setFinest(event.target.valueAsNumber), this.#writeLink()));
     for (const id of ["show-paths", "show-robots", "show-refused", "show-keep-outs", "show-grid"]) byId(id).addEventListener("change", () => this.#showLayers());
     byId("ask-frontiers").addEventListener("click", () => this.#askFor("frontiers", (bounds) => frontiers(this.session, bounds)));
@@ -266,15 +255,6 @@ export class Page {
     byId("layers-said").textContent = answer.text;
   }
 
-  #setColoring(coloring) {
-    const chosen = Array.from(byId("coloring").querySelectorAll("input")).find((input) => input.value === coloring);
-    if (!chosen) return;
-    chosen.checked = true;
-    this.scene.coloring = coloring;
-    byId("coloring-hint").hidden = !["robot", "age"].includes(coloring);
-    this.scene.repaint();
-  }
-
   #setFinest(level) {
     byId("finest").value = level;
     byId("finest-said").textContent = this.session ? `${level} (${meters(this.session.forest.side(level))})` : "";
@@ -291,12 +271,11 @@ export class Page {
 
   /** Takes over what has changed, in the panel and in the layers. */
   #follow() {
-    const { session, scene } = this;
+    const { session } = this;
     this.#measure();
-    scene.measure();
     this.cuts.measure(this.#bounds);
-    // Somebody who has not moved the camera sees the map grow as a whole.
-    if (this.#isFollowed) this.#frame();
+    this.ceiling.follow(this.#bulk);
+    this.views.follow();
     if (session.forest.isPartial && !session.isSaidPartial) {
       session.isSaidPartial = true;
       notice("This map is spread over more places than this page keeps: some are not shown.", { isBad: true });
@@ -308,16 +287,22 @@ export class Page {
     this.#showLayers();
   }
 
-  #measure() {
-    this.#bounds = this.session.forest.bounds();
-    this.#bulk = this.session.forest.bounds(STRAY);
+  /** Most of the map, as far as it is not cut off. */
+  #left() {
+    if (!this.#bulk) return undefined;
+    const { min, max } = this.cuts.cut;
+    const inside = [0, 1, 2].map((axis) => [Math.max(min[axis], this.#bulk.min[axis]), Math.min(max[axis], this.#bulk.max[axis])]);
+    return inside.every(([from, to]) => from < to) ? { min: inside.map(([from]) => from), max: inside.map(([, to]) => to) } : this.#bulk;
   }
 
-  /** Looks at the whole map, beside the panel. */
-  #frame() {
-    const { clientWidth } = byId("picture");
-    const share = Math.max(0.5, 1 - (2 * PANEL_PIXELS) / clientWidth);
-    if (this.#bounds) this.scene.camera.frame(this.#bulk, clientWidth > NARROW_PIXELS ? share : 1);
+  #measure() {
+    const { forest } = this.session;
+    this.#bounds = forest.bounds();
+    this.#bulk = forest.bounds(STRAY);
+    const { range } = this.ceiling;
+    if (!this.#bulk) return;
+    if (range) [this.#bulk.min[2], this.#bulk.max[2]] = [Math.max(range[0], this.#bulk.min[2]), Math.min(range[1], this.#bulk.max[2])];
+    this.scene.measure(this.#bounds, this.#bulk);
   }
 
   #showLists() {
@@ -334,13 +319,8 @@ export class Page {
 
   #showAnswers() {
     const { session } = this;
-    if (!session) return;
-    const goTo = (position) => {
-      this.scene.camera.target = position;
-      this.#isFollowed = false;
-      this.scene.moved();
-    };
-    showAnswers(session, goTo);
+    if (!session?.areRobotsKnown) return;
+    showAnswers(session, (position) => this.views.goTo(position));
     const size = Math.max(2 * session.forest.resolution, 0.05);
     const isShown = byId("show-refused").checked;
     const refused = `${session.name} ${session.events.number} ${isShown}`;
@@ -361,7 +341,8 @@ export class Page {
     if (!session) return;
     this.#showAnswers();
     const { robots, arrivals, keepOuts } = session;
-    const [isOfPaths, isOfRobots, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
+    const [isOfPaths, areRobotsShown, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
+    const isOfRobots = areRobotsShown && session.areRobotsKnown;
     scene.show("grid", isOfGrid && this.#bounds ? grid(this.#bulk).shape : undefined);
     scene.show("paths", isOfPaths ? paths(robots, arrivals) : undefined, true);
     const size = Math.max(2.5 * session.forest.resolution, 0.06);
@@ -369,8 +350,10 @@ export class Page {
     scene.show("keep-outs", isOfKeepOuts ? keepOutShapes(keepOuts) : undefined);
     this.labels.clear("robot ");
     this.labels.clear("keep-out ");
-    if (isOfRobots) for (const [name, { position }] of robots.seen) this.labels.put(`robot ${name}`, position, name, robotColor(arrivals.placeOf(name)));
-    if (isOfKeepOuts) for (const keepOut of keepOuts) this.labels.put(`keep-out ${keepOut.name}`, topOf(keepOut), keepOut.name, theme().keepOut);
+    if (isOfRobots) {
+      for (const { name, seen, isBad } of robotsByNeed(session)) this.labels.put(`robot ${name}`, seen.position, name, { color: robotColor(arrivals.placeOf(name)), isBad });
+    }
+    if (isOfKeepOuts) for (const keepOut of keepOuts) this.labels.put(`keep-out ${keepOut.name}`, topOf(keepOut), keepOut.name, { color: theme().keepOut });
   }
 
   #drawn() {
@@ -378,12 +361,16 @@ export class Page {
     const { text, pixels } = scaleBar(camera, byId("picture").clientHeight);
     byId("scale").style.width = `${pixels}px`;
     byId("scale-said").textContent = text;
-    byId("count").textContent = this.session ? `${count(drawn.voxels)} voxels shown` : "";
+    // While more is on its way, or the camera moves, it is not known yet.
+    if (!drawn.is_complete) return;
+    const seen = this.scene.seen();
+    byId("count").textContent = !this.session ? "" : seen === "voxels" ? `${count(drawn.voxels)} voxels shown` : "no voxel in the picture";
+    sayUnseen(seen, { uncut: () => byId("uncut").click(), all: () => this.views.showAll() });
   }
 
   /** What a link to this place says. */
   #place() {
-    return { ...cameraParts(this.scene.camera), level: this.scene.finest || undefined, color: this.scene.coloring === "height" ? undefined : this.scene.coloring };
+    return { ...cameraParts(this.scene.camera), level: this.scene.finest || undefined, color: this.scene.coloring === "height" ? undefined : this.scene.coloring, cut: this.cuts.said() };
   }
 
   #writeLink() {

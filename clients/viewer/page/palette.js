@@ -35,6 +35,9 @@ export const theme = () => (dark.matches ? THEMES.dark : THEMES.light);
 
 export const whenThemeChanges = (heard) => dark.addEventListener("change", heard);
 
+/** How many colors robots have; then they repeat. */
+export const ROBOT_COLORS = ROBOTS.length;
+
 /** The color of a robot, by its place among the robots. */
 export const robotColor = (place) => ROBOTS[place % ROBOTS.length];
 

@@ -5,6 +5,7 @@ import { choose } from "./detail.js";
 import { TILES_MAX } from "./forest.js";
 import { rgba, theme, voxelColors, whenThemeChanges } from "./palette.js";
 import { pick } from "./pick.js";
+import { isAnySeen } from "./seen.js";
 import { Shapes } from "./shapes.js";
 import { clamp } from "./vector.js";
 import { Voxels } from "./voxels.js";
@@ -12,7 +13,9 @@ import { Voxels } from "./voxels.js";
 /** Pixels that a voxel may take up before finer ones are looked for. */
 const PIXELS_MAX = 3;
 /** How much coarser the picture may be while it moves, where the machine is slow. */
-const COARSER_MAX = 6;
+const COARSER_MAX = 12;
+/** How much coarser one slow frame makes the next. */
+const COARSEN_MAX = 3;
 const SLOW_FRAME_MS = 55;
 const FAST_FRAME_MS = 22;
 const STILL_MS = 250;
@@ -52,7 +55,11 @@ export class Scene {
   #building = undefined;
   #builtShownAt = 0;
   #frameAt = 0;
+  #scheduledAt = 0;
+  #scriptMs = 0;
   #movedAt = -Infinity;
+  #isMoving = false;
+  /** How much coarser than at rest it is drawn while it moves; kept for the next motion. */
   #coarser = 1;
   #heard = new Set();
   #isPaintNeeded = true;
@@ -87,17 +94,14 @@ export class Scene {
     this.#shown = [];
     this.cut = EVERYWHERE;
     this.origin = (forest?.bounds()?.min ?? [0, 0, 0]).map(Math.round);
-    this.measure();
     this.repaint();
   }
 
-  /** Takes over how far the map reaches by now. */
-  measure() {
-    const bounds = this.#forest?.bounds();
-    if (!bounds) return;
-    const { min, max } = this.#forest.bounds(STRAY);
+  /** Takes over how far the map reaches by now, and most of it. */
+  measure(bounds, { min, max }) {
     this.#heights = [min[2], Math.max(max[2], min[2] + 0.1)];
     this.camera.reach = 2 * Math.hypot(...bounds.max.map((value, axis) => value - bounds.min[axis])) + 20;
+    this.invalidate();
   }
 
   /** Calls `heard` after each picture. */
@@ -118,6 +122,7 @@ export class Scene {
   invalidate() {
     if (this.#scheduled) return;
     this.#scheduled = true;
+    this.#scheduledAt = performance.now();
     requestAnimationFrame(() => this.#frame());
   }
 
@@ -143,6 +148,14 @@ export class Scene {
     return this.#forest && pick(this.#forest, this.#shown, this.rayAt(x, y), this.cut);
   }
 
+  /** What the picture shows of the map: "voxels", "cut" where they are cut off, or "nothing". */
+  seen() {
+    if (!this.#forest || this.#forest.roots.size === 0) return "voxels";
+    const aim = { matrix: this.camera.clipFromMap(this.origin), origin: this.origin };
+    if (isAnySeen(this.#forest, this.#shown, { ...aim, cut: this.cut })) return "voxels";
+    return isAnySeen(this.#forest, this.#forest.roots, { ...aim, cut: EVERYWHERE }) && this.cut !== EVERYWHERE ? "cut" : "nothing";
+  }
+
   /** Where in the page a place of the map is; none behind the eye. */
   pageOf(place) {
     const m = this.camera.clipFromMap(this.origin);
@@ -156,8 +169,9 @@ export class Scene {
   #frame() {
     this.#scheduled = false;
     const begin = performance.now();
-    const isMoving = begin - this.#movedAt < STILL_MS;
-    this.#adapt(begin, isMoving);
+    // A frame may come so late that the motion which asked for it seems to be over.
+    this.#isMoving = this.#movedAt >= this.#frameAt || begin - this.#movedAt < STILL_MS;
+    this.#adapt(begin);
     this.#resize();
     if (this.#isPaintNeeded) this.#paint();
     const gl = this.#gl;
@@ -172,7 +186,9 @@ export class Scene {
     this.drawn.calls += this.#shapes.calls;
     this.drawn.script_ms = performance.now() - begin;
     for (const heard of this.#heard) heard();
-    if (isMoving && this.#coarser > 1) setTimeout(() => this.invalidate(), STILL_MS);
+    this.#scriptMs = this.drawn.script_ms;
+    // Once it rests, all is drawn.
+    if (this.#isMoving && this.#coarser > 1) setTimeout(() => this.invalidate(), STILL_MS);
   }
 
   #drawMap(matrix, begin) {
@@ -180,7 +196,8 @@ export class Scene {
     const isBuilt = this.#changed().length === 0;
     if (!isBuilt) this.#building ??= setTimeout(() => this.#build());
     const cut = { min: this.cut.min.map((value) => Math.max(value, -FAR)), max: this.cut.max.map((value) => Math.min(value, FAR)) };
-    const pixelsMax = PIXELS_MAX * devicePixelRatio * this.#coarser;
+    const coarser = this.#isMoving ? this.#coarser : 1;
+    const pixelsMax = PIXELS_MAX * devicePixelRatio * coarser;
     const aim = { camera: this.camera, matrix, origin: this.origin, pixelsHigh: this.#canvas.height, pixelsMax };
     const chosen = choose(forest, { ...aim, finest: this.finest, cut, voxelsMax: VOXELS_MAX });
     const isSame = chosen.shown.length === this.#shown.length && chosen.shown.every((tile, i) => tile === this.#shown[i]);
@@ -195,7 +212,7 @@ export class Scene {
       heights: this.#heights,
       coloring: COLORINGS[this.coloring],
     });
-    const is_complete = isBuilt && chosen.wanted.length === 0 && !this.#loader.isBusy && this.#coarser === 1;
+    const is_complete = isBuilt && chosen.wanted.length === 0 && !this.#loader.isBusy && coarser === 1;
     this.drawn = { tiles: this.#shown.length, voxels, calls: 1, script_ms: 0, is_complete };
   }
 
@@ -211,7 +228,7 @@ export class Scene {
     let left = this.#changed();
     while (left.length > 0 && performance.now() - begin < BUILD_MS) {
       const tile = left.shift();
-      tile.build();
+      tile.build(tile.isUntagged ? this.#arrivals?.tags.of(tile) : undefined);
       // Without room it stays away, and its parent is drawn instead.
       tile.isDrawable = this.#voxels.pages.write(tile);
     }
@@ -234,12 +251,13 @@ export class Scene {
   }
 
   /** Draws coarser for as long as the camera moves and frames come slowly. */
-  #adapt(now, isMoving) {
-    const between = now - this.#frameAt;
+  #adapt(now) {
+    // Frames come as fast as they are drawn, but none while nobody asks for one.
+    const took = Math.max(now - Math.max(this.#frameAt, this.#scheduledAt), this.#scriptMs);
     this.#frameAt = now;
-    if (!isMoving) this.#coarser = 1;
-    else if (between < 1000 && between > SLOW_FRAME_MS) this.#coarser = Math.min(this.#coarser * 1.5, COARSER_MAX);
-    else if (between < FAST_FRAME_MS) this.#coarser = Math.max(this.#coarser / 1.1, 1);
+    if (!this.#isMoving) return;
+    if (took > SLOW_FRAME_MS) this.#coarser = clamp(this.#coarser * clamp(Math.sqrt(took / SLOW_FRAME_MS), 1.2, COARSEN_MAX), 1, COARSER_MAX);
+    else if (took < FAST_FRAME_MS) this.#coarser = Math.max(this.#coarser / 1.1, 1);
   }
 
   #resize() {
@@ -251,7 +269,6 @@ export class Scene {
 
   #paint() {
     this.#isPaintNeeded = false;
-    const now = performance.now();
-    this.#voxels.paint(voxelColors((tag) => this.#arrivals?.colorOf(tag, this.coloring === "age", now)));
+    this.#voxels.paint(voxelColors((tag) => this.#arrivals?.colorOf(tag, this.coloring === "age")));
   }
 }

@@ -5,14 +5,19 @@ import { Arrivals } from "./arrivals.js";
 import { Events } from "./events.js";
 import { Forest } from "./forest.js";
 import { Loader } from "./loader.js";
+import { readPast } from "./past.js";
 import { Robots } from "./robots.js";
 import { Watch } from "./watch.js";
 
 export class Session {
   keepOuts = [];
+  /** The robots were read, or were tried to be. */
+  areRobotsKnown = false;
   #told;
   #watch;
   #isClosed = false;
+  #past;
+  #pastStop = new AbortController();
 
   /** `told` has `arrived`, `changed(change)`, `robots`, `keepOuts`, `connected`, `lost`, `reset` and `failed`. */
   constructor(info, told) {
@@ -25,7 +30,7 @@ export class Session {
     this.robots = new Robots(this.name);
     this.events = new Events(this.name);
     const failed = (problem) => this.#isClosed || told.failed(problem);
-    this.loader = new Loader(this.name, this.forest, { fetched: (tile) => this.arrivals.tagIn(this.forest, tile), arrived: told.arrived, failed });
+    this.loader = new Loader(this.name, this.forest, { fetched: (tile) => (tile.isUntagged = true), arrived: told.arrived, failed });
   }
 
   static async open(name, told) {
@@ -53,14 +58,15 @@ export class Session {
   close() {
     this.#isClosed = true;
     this.#watch?.stop();
+    this.#pastStop.abort();
     this.loader.stop();
   }
 
   #take(change) {
     const { scan } = change;
-    const forget = (tag) => Array.from(this.forest.tiles(), (tile) => tile.forget(tag));
-    const tag = scan ? this.arrivals.tagOf(scan.robot, performance.now(), forget) : 0;
-    this.arrivals.remember(change.added, tag);
+    const retag = (table) => Array.from(this.forest.tiles(), (tile) => tile.retag(table));
+    const tag = scan ? this.arrivals.tagOf(scan.robot, change.revision, performance.now(), retag) : 0;
+    this.arrivals.take(change, tag);
     this.loader.note(change, tag);
     this.forest.apply(change, tag);
     this.revision = Math.max(this.revision, change.revision);
@@ -70,13 +76,29 @@ export class Session {
     this.#told.changed(change);
   }
 
-  readRobots() {
-    return this.#reading(() => this.robots.load(), this.#told.robots);
+  /** Reads who brought what was there before, once: the first revision that is known of, or none. */
+  readPast() {
+    this.#past ??= readPast(this, this.#pastStop.signal).then((first) => {
+      for (const tile of this.forest.tiles()) tile.isUntagged = tile.isChanged = true;
+      if (!this.#isClosed) this.#told.arrived();
+      return first;
+    });
+    this.#past.catch(() => (this.#past = undefined));
+    return this.#past;
+  }
+
+  async readRobots() {
+    await this.#reading(() => this.robots.load(), () => {
+      // In the order in which they came to the map, so that each has the same color in every page.
+      for (const name of this.robots.seen.keys()) this.arrivals.placeOf(name);
+    });
+    this.areRobotsKnown = true;
+    if (!this.#isClosed) this.#told.robots();
   }
 
   /** Where the robots are by now, those too whose scans change nothing. */
-  lookForRobots() {
-    return this.#reading(() => this.robots.look(), this.#told.robots);
+  async lookForRobots() {
+    if (this.areRobotsKnown) await this.#reading(() => this.robots.look(), this.#told.robots);
   }
 
   readKeepOuts() {

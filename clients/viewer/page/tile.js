@@ -27,6 +27,8 @@ export class Tile {
     this.isChanged = true;
     /** The GPU has it, as it was once. */
     this.isDrawable = false;
+    /** Its cells may have tags that it does not know of. */
+    this.isUntagged = false;
     /** It may hold what went since: to be fetched again. */
     this.isStale = false;
     this.drawnAt = 0;
@@ -41,13 +43,6 @@ export class Tile {
     this.bits[(z * SIDE + y) * 2 + (x >> 5)] |= 1 << (x & 31);
     this.octants |= 1 << ((x >> 5) | ((y >> 5) << 1) | ((z >> 5) << 2));
     if (tag) this.fresh.set(x | (y << 6) | (z << 12), tag);
-    this.isChanged = true;
-  }
-
-  /** Says who brought a cell that is here. */
-  tag(x, y, z, tag) {
-    if (!this.has(x, y, z)) return;
-    this.fresh.set(x | (y << 6) | (z << 12), tag);
     this.isChanged = true;
   }
 
@@ -86,8 +81,8 @@ export class Tile {
     this.bits[at + 2 * SIDE + 2] |= (bits >> 6) << shift;
   }
 
-  /** Makes the words anew from the bits. */
-  build() {
+  /** Makes the words anew from the bits; `tags` may have tags of cells of which none is known. */
+  build(tags) {
     const { bits, words: old, fresh } = this;
     const words = new Uint32Array(bits.reduce((sum, word) => sum + ones(word), 0));
     let count = 0;
@@ -115,24 +110,25 @@ export class Tile {
           for (let face = 0; face < 6; face++) faces |= (~(neighbors[face] >>> bit) & 1) << face;
           while (before < old.length && (old[before] & CELL) < cell) before++;
           const kept = before < old.length && (old[before] & CELL) === cell ? old[before] >>> TAG_SHIFT : 0;
-          const tag = fresh.size > 0 ? (fresh.get(cell) ?? kept) : kept;
+          const tag = (fresh.size > 0 ? (fresh.get(cell) ?? kept) : kept) || (tags?.[cell] ?? 0);
           words[count++] = cell | (faces << 18) | (tag << TAG_SHIFT);
         }
       }
     }
     this.words = words;
     this.fresh.clear();
-    this.isChanged = false;
+    this.isChanged = this.isUntagged = false;
   }
 
-  /** Takes a tag away from what has it. */
-  forget(tag) {
+  /** Gives each tag the one that stands in its place in a table. */
+  retag(table) {
     for (let i = 0; i < this.words.length; i++) {
-      if (this.words[i] >>> TAG_SHIFT !== tag) continue;
-      this.words[i] &= 0xffffff;
+      const tag = this.words[i] >>> TAG_SHIFT;
+      if (table[tag] === tag) continue;
+      this.words[i] = (this.words[i] & 0xffffff) | (table[tag] << TAG_SHIFT);
       this.isChanged = true;
     }
-    for (const [cell, of] of this.fresh) if (of === tag) this.fresh.delete(cell);
+    for (const [cell, tag] of this.fresh) this.fresh.set(cell, table[tag]);
   }
 }
 

@@ -106,7 +106,7 @@ export class Watch {
 }
 
 /** The messages of a stream, each behind its length in four bytes. */
-async function* framesOf(reader, heard) {
+export async function* framesOf(reader, heard) {
   let kept = new Uint8Array(0);
   for (;;) {
     const { done, value } = await reader.read();
@@ -136,7 +136,7 @@ function stateOf(bytes) {
   return state;
 }
 
-function changeOf(bytes) {
+export function changeOf(bytes) {
   const none = new Uint8Array(0);
   const change = { revision: 0, isComplete: false, removed: none, added: none, cause: "other" };
   readMessage(bytes, {
@@ -173,7 +173,7 @@ function scanOf(bytes) {
   return scan;
 }
 
-function failureOf(bytes) {
+export function failureOf(bytes) {
   const failure = { code: RPC_UNAVAILABLE, reason: "", message: "" };
   readMessage(bytes, {
     1: (code) => (failure.code = code),
