@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
@@ -58,7 +58,7 @@ pub(super) struct Check {
     #[arg(long, value_parser = parse::keyword::<Unknown>(), default_value = "free")]
     unknown: Unknown,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl Check {
@@ -97,7 +97,7 @@ impl Check {
         configurations: Vec<f32>,
         output: &Output,
     ) -> Result<(), CliError> {
-        let (asked, surroundings) = (self.asked.asked(), self.surroundings());
+        let (asked, surroundings) = (self.asked.scope(), self.surroundings());
         let check = PoseCheck { asked, body, configurations, surroundings, answer: CheckAs::FirstHit };
         let answered = client.check_poses(self.map_name(), check).await?;
         let Collisions::FirstHits(hits) = answered.answer else {
@@ -125,7 +125,7 @@ impl Check {
         most_m: Option<f32>,
         output: &Output,
     ) -> Result<(), CliError> {
-        let (asked, surroundings) = (self.asked.asked(), self.surroundings());
+        let (asked, surroundings) = (self.asked.scope(), self.surroundings());
         let answer = CheckAs::Clearance { most_m };
         let check = PoseCheck { asked, body, configurations, surroundings, answer };
         let answered = client.check_poses(self.map_name(), check).await?;
@@ -147,7 +147,7 @@ impl Check {
         output: &Output,
     ) -> Result<(), CliError> {
         let check = MotionCheck {
-            asked: self.asked.asked(),
+            asked: self.asked.scope(),
             body,
             configurations,
             lengths: vec![self.pose.len() as u32],

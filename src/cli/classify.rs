@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::asked::AskedOptions;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use super::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
@@ -38,7 +38,7 @@ pub(super) struct Classify {
     #[command(flatten)]
     survey: SurveyOptions,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl Classify {
@@ -46,7 +46,7 @@ impl Classify {
         let Self { points_file, point, map, survey, asked } = self;
         let client = map.server.connect().await?;
         let points = survey.points(&client, &map.name, points_file.as_deref(), &point).await?;
-        let question = ClassifyQuestion { asked: asked.asked(), points: points.clone().into() };
+        let question = ClassifyQuestion { asked: asked.scope(), points: points.clone().into() };
         let answered = client.classify_points(&map.name, question).await?;
         let (states, revision) = (answered.answer, answered.version.revision);
         if states.points != points.len() {

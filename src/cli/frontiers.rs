@@ -5,8 +5,8 @@ use std::fmt::Display;
 
 use serde::Serialize;
 
-use super::asked::AskedOptions;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::count;
@@ -41,13 +41,13 @@ pub(super) struct ListFrontiers {
     #[arg(long, value_name = "METERS")]
     standoff: Option<f64>,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl ListFrontiers {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let Self { map, r#box: (min_m, max_m), size_min, most, standoff, asked } = self;
-        let (asked, standoff_m) = (asked.asked(), standoff);
+        let (asked, standoff_m) = (asked.scope(), standoff);
         let question = FrontierQuestion { asked, min_m, max_m, size_min, frontiers_max: most, standoff_m };
         let client = map.server.connect().await?;
         let answered = client.list_frontiers(&map.name, question).await?;

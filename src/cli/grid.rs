@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::asked::AskedOptions;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::count;
@@ -60,7 +60,7 @@ pub(super) struct DrawGrid {
     #[arg(long)]
     unknown: bool,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl DrawGrid {
@@ -75,7 +75,7 @@ impl DrawGrid {
             cell_m: cell,
             tells_unknown: unknown,
         };
-        let question = GridQuestion { asked: asked.asked(), scope };
+        let question = GridQuestion { asked: asked.scope(), scope };
         let client = map.server.connect().await?;
         let (grid, versions) = client.whole_grid(&map.name, question).await?;
         if grid.cells() == 0 {

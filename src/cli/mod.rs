@@ -5,7 +5,6 @@
 //! makes no sense, and 3 when a scan was answered and not accepted (`insert` and `localize`).
 
 mod alignment_options;
-mod asked;
 mod block;
 mod check;
 mod classify;
@@ -34,6 +33,7 @@ mod query;
 mod rays;
 mod remote;
 mod scan_report;
+mod scope;
 mod snapshot;
 mod survey;
 mod undo;

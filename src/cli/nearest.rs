@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use super::survey::SurveyOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
@@ -45,7 +45,7 @@ pub(super) struct Nearest {
     #[arg(long, value_parser = parse::keyword::<MeasuredTo>(), default_value = "cubes")]
     to: MeasuredTo,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl Nearest {
@@ -54,7 +54,7 @@ impl Nearest {
         let client = map.server.connect().await?;
         let points = survey.points(&client, &map.name, points_file.as_deref(), &point).await?;
         let question =
-            NearestQuestion { asked: asked.asked(), points: points.clone().into(), radius_m: radius, to };
+            NearestQuestion { asked: asked.scope(), points: points.clone().into(), radius_m: radius, to };
         let answered = client.find_nearest(&map.name, question).await?;
         let (nearest, revision) = (answered.answer, answered.version.revision);
         if nearest.len() != points.len() {

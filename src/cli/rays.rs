@@ -5,9 +5,9 @@ use std::fmt::Display;
 
 use serde::Serialize;
 
-use super::asked::AskedOptions;
 use super::met::met;
 use super::remote::MapOptions;
+use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
@@ -46,7 +46,7 @@ pub(super) struct CastRays {
     #[arg(long, value_parser = parse::keyword::<Unknown>(), default_value = "free")]
     unknown: Unknown,
     #[command(flatten)]
-    asked: AskedOptions,
+    asked: ScopeOptions,
 }
 
 impl CastRays {
@@ -58,7 +58,7 @@ impl CastRays {
         } else {
             RaysToward::Ends(to.into())
         };
-        let question = RayQuestion { asked: asked.asked(), origins: vec![from].into(), toward, unknown };
+        let question = RayQuestion { asked: asked.scope(), origins: vec![from].into(), toward, unknown };
         let client = map.server.connect().await?;
         let answered = client.cast_rays(&map.name, question).await?;
         let (hits, revision) = (answered.answer, answered.version.revision);

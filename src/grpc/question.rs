@@ -9,9 +9,9 @@ use super::stream;
 use super::stream::{Answers, Counted};
 use crate::access::Operation;
 use crate::admission::{InboundBody, off_runtime};
-use mrol_client::wire::{QuestionMessage, pb, question_of, status_of};
+use mrol_client::wire::{QuestionMessage, parse_question, pb, status_of};
 use mrol_map::map::MapName;
-use mrol_service::{Answered, MapService, Question, ServiceError};
+use mrol_service::{AtVersion, MapService, Question, ServiceError};
 
 impl Adapter {
     /// Answers one question.
@@ -20,7 +20,7 @@ impl Adapter {
         Q: Question,
         M: Message + QuestionMessage + 'static,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
-        A: Message + From<Answered<Q::Answer>>,
+        A: Message + From<AtVersion<Q::Answer>>,
     {
         let service = service_of(&request).map_err(status_of)?;
         let arrival = InboundBody::of(request.extensions()).map_err(status_of)?.clone();
@@ -40,7 +40,7 @@ impl Adapter {
         Q: Question,
         M: stream::Message + QuestionMessage,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
-        A: Message + From<Answered<Q::Answer>> + 'static,
+        A: Message + From<AtVersion<Q::Answer>> + 'static,
     {
         let ask = |service: MapService, request: M, counted: Counted| async move {
             let (map, question) = question::<Q, _, _>(&service, request, counted).await?;
@@ -60,7 +60,7 @@ where
     C: Send + 'static,
 {
     let (bytes, of_limits) = (message.encoded_len(), service.clone());
-    off_runtime(service, bytes, counted, move || question_of(message, of_limits.limits())).await?
+    off_runtime(service, bytes, counted, move || parse_question(message, of_limits.limits())).await?
 }
 
 /// Makes messages of streams of requests that may leave out their map.

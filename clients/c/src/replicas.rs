@@ -6,7 +6,7 @@ use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use mrol_client::planning::clearance_max_m;
-use mrol_client::service::{Answered, PointAnswer, PointQuery, Question};
+use mrol_client::service::{AtVersion, PointAnswer, PointQuery, Question};
 use mrol_client::{Client, Replica};
 use parking_lot::{Mutex, RwLock};
 use tokio::runtime::{Builder, Runtime};
@@ -138,7 +138,7 @@ impl OpenReplica {
     }
 
     /// Answers a question of a planner.
-    pub(crate) fn ask<Q: Question>(&self, question: &Q) -> Result<Answered<Q::Answer>, Failure> {
+    pub(crate) fn ask<Q: Question>(&self, question: &Q) -> Result<AtVersion<Q::Answer>, Failure> {
         Ok(self.replica.ask(question)?)
     }
 }

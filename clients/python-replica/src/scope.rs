@@ -1,6 +1,6 @@
 //! The options that all questions have in common.
 
-use mrol_client::service::Asked;
+use mrol_client::service::QuestionScope;
 use mrol_client::wire::uuid_from;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -10,17 +10,17 @@ use pyo3::types::{PyBool, PyDict};
 use crate::failure::{Failure, argument};
 
 /// The options that were given, by the names that `QuestionScope` of the package `mrol` declares; `None` without any.
-pub(crate) struct Scope(Asked);
+pub(crate) struct Scope(QuestionScope);
 
 impl Scope {
     /// The options of a question: those that were given, and the defaults of the others.
-    pub(crate) fn asked(scope: Option<Self>) -> Asked {
-        scope.map_or_else(Asked::default, |scope| scope.0)
+    pub(crate) fn asked(scope: Option<Self>) -> QuestionScope {
+        scope.map_or_else(QuestionScope::default, |scope| scope.0)
     }
 
     /// The options that a dictionary has.
     fn of(given: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let mut asked = Asked::default();
+        let mut asked = QuestionScope::default();
         for (name, value) in given {
             let name: PyBackedStr = name.extract()?;
             match &*name {

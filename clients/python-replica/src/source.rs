@@ -5,7 +5,7 @@ use std::sync::{Arc, RwLock};
 
 use mrol_client::Replica;
 use mrol_client::map::MapName;
-use mrol_client::service::{Answered, MapService, PointAnswer, PointQuery, Question};
+use mrol_client::service::{AtVersion, MapService, PointAnswer, PointQuery, Question};
 use pyo3::prelude::*;
 
 use crate::failure::Failure;
@@ -62,7 +62,7 @@ impl Drop for OpenSource {
 
 impl Source {
     /// Answers a question of a planner, while other threads of Python go on.
-    pub(crate) fn ask<Q: Question>(&self, py: Python<'_>, question: Q) -> PyResult<Answered<Q::Answer>> {
+    pub(crate) fn ask<Q: Question>(&self, py: Python<'_>, question: Q) -> PyResult<AtVersion<Q::Answer>> {
         match self {
             Self::Replica(replica) => Ok(py.detach(|| replica.ask(&question)).map_err(Failure::from)?),
             Self::Local { service, name } => wait_for(py, service.ask(name, question)),

@@ -9,13 +9,13 @@ use crate::wire::pb;
 use mrol_map::map::MapName;
 use mrol_map::planning::{Frontiers, Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
 use mrol_service::{
-    Answered, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, GridTile, MapVersion,
+    AtVersion, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, GridTile, MapVersion,
     MotionCheck, NearestQuestion, PoseCheck, RayQuestion, Reason, ServiceError, SphereCheck, TILED_CELLS_MAX,
 };
 
 impl Client {
     /// Returns of each configuration whether a body meets a voxel, or what it meets first, or how much room it has, at
-    /// the state that [`Answered::version`] names.
+    /// the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -23,7 +23,7 @@ impl Client {
         &self,
         map: &MapName,
         check: PoseCheck,
-    ) -> Result<Answered<Collisions>, ClientError> {
+    ) -> Result<AtVersion<Collisions>, ClientError> {
         let request = self.request((map, check));
         self.domain(self.connection.occupancy().check_poses(request).await)
     }
@@ -36,7 +36,7 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = PoseCheck> + Send + 'static,
-    ) -> Result<Answers<Answered<Collisions>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Collisions>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |check| pb::CheckPosesRequest::from((&map, check)));
         let answers = self.connection.occupancy().check_poses_stream(requests).await;
@@ -44,7 +44,7 @@ impl Client {
     }
 
     /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is,
-    /// at the state that [`Answered::version`] names.
+    /// at the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -52,7 +52,7 @@ impl Client {
         &self,
         map: &MapName,
         check: SphereCheck,
-    ) -> Result<Answered<Collisions>, ClientError> {
+    ) -> Result<AtVersion<Collisions>, ClientError> {
         let request = self.request((map, check));
         self.domain(self.connection.occupancy().check_spheres(request).await)
     }
@@ -65,14 +65,14 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = SphereCheck> + Send + 'static,
-    ) -> Result<Answers<Answered<Collisions>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Collisions>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |check| pb::CheckSpheresRequest::from((&map, check)));
         let answers = self.connection.occupancy().check_spheres_stream(requests).await;
         self.connection.answers(answers)
     }
 
-    /// Returns of each motion whether a body can make it, at the state that [`Answered::version`] names.
+    /// Returns of each motion whether a body can make it, at the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -80,7 +80,7 @@ impl Client {
         &self,
         map: &MapName,
         check: MotionCheck,
-    ) -> Result<Answered<Vec<MotionAnswer>>, ClientError> {
+    ) -> Result<AtVersion<Vec<MotionAnswer>>, ClientError> {
         let request = self.request((map, check));
         self.domain(self.connection.occupancy().check_motions(request).await)
     }
@@ -93,14 +93,14 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = MotionCheck> + Send + 'static,
-    ) -> Result<Answers<Answered<Vec<MotionAnswer>>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Vec<MotionAnswer>>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |check| pb::CheckMotionsRequest::from((&map, check)));
         let answers = self.connection.occupancy().check_motions_stream(requests).await;
         self.connection.answers(answers)
     }
 
-    /// Returns what each ray meets first, at the state that [`Answered::version`] names.
+    /// Returns what each ray meets first, at the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -108,7 +108,7 @@ impl Client {
         &self,
         map: &MapName,
         rays: RayQuestion,
-    ) -> Result<Answered<RayHits>, ClientError> {
+    ) -> Result<AtVersion<RayHits>, ClientError> {
         let request = self.request((map, rays));
         self.domain(self.connection.occupancy().cast_rays(request).await)
     }
@@ -121,14 +121,14 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = RayQuestion> + Send + 'static,
-    ) -> Result<Answers<Answered<RayHits>>, ClientError> {
+    ) -> Result<Answers<AtVersion<RayHits>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |rays| pb::CastRaysRequest::from((&map, rays)));
         let answers = self.connection.occupancy().cast_rays_stream(requests).await;
         self.connection.answers(answers)
     }
 
-    /// Returns the occupied voxel that is nearest to each point, at the state that [`Answered::version`] names.
+    /// Returns the occupied voxel that is nearest to each point, at the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -136,7 +136,7 @@ impl Client {
         &self,
         map: &MapName,
         points: NearestQuestion,
-    ) -> Result<Answered<NearestVoxels>, ClientError> {
+    ) -> Result<AtVersion<NearestVoxels>, ClientError> {
         let request = self.request((map, points));
         self.domain(self.connection.occupancy().find_nearest(request).await)
     }
@@ -149,14 +149,14 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = NearestQuestion> + Send + 'static,
-    ) -> Result<Answers<Answered<NearestVoxels>>, ClientError> {
+    ) -> Result<Answers<AtVersion<NearestVoxels>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |points| pb::FindNearestRequest::from((&map, points)));
         let answers = self.connection.occupancy().find_nearest_stream(requests).await;
         self.connection.answers(answers)
     }
 
-    /// Returns of each point whether it is occupied, free, or unknown, at the state that [`Answered::version`] names.
+    /// Returns of each point whether it is occupied, free, or unknown, at the state that [`AtVersion::version`] names.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -164,7 +164,7 @@ impl Client {
         &self,
         map: &MapName,
         points: ClassifyQuestion,
-    ) -> Result<Answered<PointStates>, ClientError> {
+    ) -> Result<AtVersion<PointStates>, ClientError> {
         let request = self.request((map, points));
         self.domain(self.connection.occupancy().classify_points(request).await)
     }
@@ -177,7 +177,7 @@ impl Client {
         &self,
         map: &MapName,
         batches: impl Stream<Item = ClassifyQuestion> + Send + 'static,
-    ) -> Result<Answers<Answered<PointStates>>, ClientError> {
+    ) -> Result<Answers<AtVersion<PointStates>>, ClientError> {
         let map = map.clone();
         let requests = batches.map(move |points| pb::ClassifyPointsRequest::from((&map, points)));
         let answers = self.connection.occupancy().classify_points_stream(requests).await;
@@ -192,7 +192,7 @@ impl Client {
         &self,
         map: &MapName,
         question: FrontierQuestion,
-    ) -> Result<Answered<Frontiers>, ClientError> {
+    ) -> Result<AtVersion<Frontiers>, ClientError> {
         let request = self.request((map, question));
         self.domain(self.connection.occupancy().list_frontiers(request).await)
     }
@@ -205,7 +205,7 @@ impl Client {
         &self,
         map: &MapName,
         grid: GridQuestion,
-    ) -> Result<Answered<Grid>, ClientError> {
+    ) -> Result<AtVersion<Grid>, ClientError> {
         let request = self.request((map, grid));
         self.domain(self.connection.occupancy().project_grid(request).await)
     }
@@ -246,7 +246,7 @@ impl Client {
                 size,
                 tiles: of_all,
                 first,
-                grid: Answered { answer: part, version },
+                grid: AtVersion { answer: part, version },
                 ..
             } = tile;
             expected = of_all;

@@ -41,9 +41,9 @@ pub use limits::{Limits, Marks};
 pub use map_service::MapService;
 pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};
 pub use question::{
-    Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
-    GridQuestion, GridScope, GridTile, GridTiles, KnownPart, MotionCheck, NearestQuestion, PoseCheck,
-    Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck, TILED_CELLS_MAX,
+    AtVersion, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion, GridQuestion,
+    GridScope, GridTile, GridTiles, KnownPart, MotionCheck, NearestQuestion, PoseCheck, Question,
+    QuestionScope, QuestionTarget, RayQuestion, RaysToward, SphereCheck, TILED_CELLS_MAX,
 };
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,

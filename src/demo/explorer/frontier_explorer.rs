@@ -13,7 +13,9 @@ use mrol_map::geometry::Pose;
 use mrol_map::map::{MapName, Region, RobotName, SessionName};
 use mrol_map::mapping::Guess;
 use mrol_map::planning::{Body, Frontier, Surroundings, Unknown};
-use mrol_service::{Asked, CheckAs, FrontierQuestion, MotionCheck, PoseCheck, ScanAnswer, ScanRequest};
+use mrol_service::{
+    CheckAs, FrontierQuestion, MotionCheck, PoseCheck, QuestionScope, ScanAnswer, ScanRequest,
+};
 use mrol_simulate::{Scene, SpinningLidar};
 
 /// Level of the voxels that are asked about: 10 cm in a map of 5 cm.
@@ -154,7 +156,7 @@ impl Explorer {
         let [[x_min, y_min], [x_max, y_max]] = self.around();
         let [z_min, z_max] = FRONTIER_HEIGHTS_M;
         let question = FrontierQuestion {
-            asked: Asked { level: FRONTIER_LEVEL, ..Asked::default() },
+            asked: QuestionScope { level: FRONTIER_LEVEL, ..QuestionScope::default() },
             min_m: [x_min, y_min, z_min],
             max_m: [x_max, y_max, z_max],
             size_min: Some(FRONTIER_SIZE_MIN),
@@ -184,7 +186,7 @@ impl Explorer {
         ];
         for (surroundings, body, cost) in checks {
             let check = PoseCheck {
-                asked: Asked { level: LEVEL, ..Asked::default() },
+                asked: QuestionScope { level: LEVEL, ..QuestionScope::default() },
                 body: Arc::clone(body),
                 configurations: configurations(&places),
                 surroundings,
@@ -205,7 +207,7 @@ impl Explorer {
         let mut first_hit: Option<f32> = None;
         for surroundings in self.surroundings() {
             let check = MotionCheck {
-                asked: Asked { level: LEVEL, ..Asked::default() },
+                asked: QuestionScope { level: LEVEL, ..QuestionScope::default() },
                 body: Arc::clone(&self.body),
                 configurations: configurations(way),
                 lengths: vec![way.len() as u32],

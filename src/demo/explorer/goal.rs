@@ -6,7 +6,7 @@ use super::ways::{Cell, Ways};
 use mrol_client::ClientError;
 use mrol_map::geometry::Point;
 use mrol_map::planning::{Frontier, Unknown};
-use mrol_service::{Asked, RayQuestion, RaysToward};
+use mrol_service::{QuestionScope, RayQuestion, RaysToward};
 
 /// How far from the place from which a frontier can be seen the robot may stop, meters.
 const NEAR_VIEW_M: f64 = 0.4;
@@ -73,7 +73,7 @@ impl Explorer {
         let origins = looks.iter().map(|(_, _, look)| point(look.origin_m)).collect::<Vec<_>>();
         if !looks.is_empty() {
             let question = RayQuestion {
-                asked: Asked::default(),
+                asked: QuestionScope::default(),
                 origins: origins.into(),
                 toward: RaysToward::Ends(toward.into()),
                 unknown: Unknown::Free,

@@ -25,7 +25,7 @@ use crate::http::adapter::Adapter;
 use crate::http::error::HttpError;
 use crate::http::forms::JsonPoints;
 use crate::http::forms::{Sent, body};
-use mrol_client::wire::{QuestionMessage, bytes_of, pb, question_of};
+use mrol_client::wire::{QuestionMessage, bytes_of, parse_question, pb};
 use mrol_map::map::MapName;
 use mrol_service::{MapService, PointCloud, Question, Reason, ServiceError};
 
@@ -93,7 +93,7 @@ impl<T: Send + 'static> QuestionBody<T> {
     {
         let Self { head, arrays, bytes, arrival, .. } = self;
         let of_limits = service.clone();
-        let make = move || question_of(message(head, &arrays)?, of_limits.limits());
+        let make = move || parse_question(message(head, &arrays)?, of_limits.limits());
         Ok(off_runtime(service, bytes, arrival, make).await??)
     }
 }

@@ -11,7 +11,7 @@ use super::scope::Scoped;
 use crate::http::error::HttpError;
 use mrol_client::wire::{QuestionMessage, pb};
 use mrol_map::map::MapName;
-use mrol_service::{Answered, MapService, Question, ServiceError};
+use mrol_service::{AtVersion, MapService, Question, ServiceError};
 
 /// A question of a planner as the body of a request asks it.
 pub(in crate::http) trait HttpQuestion: Scoped + DeserializeOwned + Send + 'static {
@@ -33,7 +33,7 @@ pub(in crate::http) trait HttpQuestion: Scoped + DeserializeOwned + Send + 'stat
 }
 
 /// The answer to a question, with the version that it is of.
-pub(in crate::http) type AnswerOf<B> = Answered<<<B as HttpQuestion>::Question as Question>::Answer>;
+pub(in crate::http) type AnswerOf<B> = AtVersion<<<B as HttpQuestion>::Question as Question>::Answer>;
 
 impl<B> QuestionBody<B>
 where

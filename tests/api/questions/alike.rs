@@ -6,7 +6,7 @@ use mrol::geometry::Point;
 use mrol::map::Region;
 use mrol::planning::{BandFrom, GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol::service::{
-    Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck,
+    CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, QuestionScope,
     RayQuestion, RaysToward, SphereCheck,
 };
 use reqwest::StatusCode;
@@ -68,7 +68,7 @@ async fn spheres_are_checked_group_by_group() {
     let (daemon, client, replica) = row_of_voxels().await;
     let sphere = |y: f32| Sphere { center_m: [0.55, y, 0.05], radius_m: 0.1 };
     let check = SphereCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         spheres: vec![sphere(0.5), sphere(0.15), sphere(0.4)],
         sizes: vec![2, 1],
         padding_m: 0.0,
@@ -87,7 +87,7 @@ async fn spheres_are_checked_group_by_group() {
 async fn motions_are_checked_alike_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let check = MotionCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         body: ball(0.1),
         configurations: [at(1.0, 1.05, 0.05), at(1.0, -0.95, 0.05), at(0.0, 1.0, 0.0), at(2.0, 1.0, 0.0)]
             .concat(),
@@ -115,7 +115,7 @@ async fn rays_are_cast_alike_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let points = |of: &[[f32; 3]]| of.iter().copied().map(Point::from).collect::<Vec<_>>().into();
     let question = RayQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         origins: points(&[[-1.0, 0.05, 0.05]]),
         toward: RaysToward::Directions {
             directions: points(&[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
@@ -137,7 +137,7 @@ async fn rays_are_cast_alike_everywhere() {
 async fn nearest_voxels_are_found_alike_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let question = NearestQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         points: vec![Point::new(0.55, 0.3, 0.05), Point::new(9.0, 9.0, 9.0)].into(),
         radius_m: 1.0,
         to: MeasuredTo::Cubes,
@@ -162,7 +162,7 @@ async fn the_map_is_drawn_from_above_alike_everywhere() {
         cell_m: Some(0.2),
         tells_unknown: false,
     };
-    let question = GridQuestion { asked: Asked::default(), scope };
+    let question = GridQuestion { asked: QuestionScope::default(), scope };
     let told = client.project_grid(&map(), question).await.unwrap();
     // Cells begin at whole multiples of their side: y from -0.2 on.
     assert_eq!((told.answer.size, told.answer.occupied.clone()), ([2, 2], vec![0b1100]));

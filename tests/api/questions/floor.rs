@@ -5,7 +5,7 @@ use mrol::geometry::{Point, Pose};
 use mrol::map::{Region, RobotName};
 use mrol::mapping::Guess;
 use mrol::planning::{BandFrom, Grid, GridArea};
-use mrol::service::{Asked, GridQuestion, GridScope, PointCloud, ScanRequest};
+use mrol::service::{GridQuestion, GridScope, PointCloud, QuestionScope, ScanRequest};
 use serde_json::json;
 
 use super::{map, row_of_voxels};
@@ -45,7 +45,7 @@ async fn server() -> (Daemon, Client) {
 fn question(band_m: [f64; 2], band_from: BandFrom) -> GridQuestion {
     let area = GridArea::Rectangle { min_m: [-3.0; 2], max_m: [4.5; 2] };
     let scope = GridScope { area, band_m, band_from, cell_m: None, tells_unknown: true };
-    GridQuestion { asked: Asked::default(), scope }
+    GridQuestion { asked: QuestionScope::default(), scope }
 }
 
 fn cells(grid: &Grid) -> (&[u64], Option<&[u64]>) {

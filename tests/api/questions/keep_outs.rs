@@ -6,7 +6,7 @@ use mrol::geometry::Point;
 use mrol::map::{KeepOutName, Region};
 use mrol::planning::{BandFrom, GridArea, MeasuredTo, Met, Surroundings, Unknown};
 use mrol::service::{
-    Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck,
+    CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, QuestionScope,
     RayQuestion, RaysToward,
 };
 use mrol::voxel::VoxelKey;
@@ -71,7 +71,7 @@ async fn keep_outs_count_for_motions_unless_they_are_ignored() {
     let (daemon, client, replica) = row_and_crate().await;
     let configurations = [at(-1.0, 1.5, 0.05), at(1.0, 1.5, 0.05), at(-1.0, 0.5, 0.05), at(3.0, 0.5, 0.05)];
     let check = MotionCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         body: ball(0.1),
         configurations: configurations.concat(),
         lengths: vec![2, 2],
@@ -99,7 +99,7 @@ async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
     let (daemon, client, replica) = row_and_crate().await;
     let points = |of: &[[f32; 3]]| of.iter().copied().map(Point::from).collect::<Vec<_>>().into();
     let rays = RayQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         origins: points(&[[0.55, 0.4, 0.05]]),
         toward: RaysToward::Directions {
             directions: points(&[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -121,7 +121,7 @@ async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
     assert_eq!((&told["voxels"][0], &told["hit"]), (&Value::Null, &json!([true, true, false])));
 
     let nearest = NearestQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         points: points(&[[0.55, 0.9, 0.05], [0.55, 0.2, 0.05], [0.55, 1.5, 0.05]]),
         radius_m: 1.0,
         to: MeasuredTo::Cubes,
@@ -152,12 +152,12 @@ async fn keep_outs_are_occupied_in_the_map_from_above_unless_they_are_ignored() 
         cell_m: Some(0.2),
         tells_unknown: false,
     };
-    let question = GridQuestion { asked: Asked::default(), scope: scope([0.0, 1.0]) };
+    let question = GridQuestion { asked: QuestionScope::default(), scope: scope([0.0, 1.0]) };
     let told = client.project_grid(&map(), question).await.unwrap().answer;
     assert_eq!((told.size, told.occupied.clone()), ([2, 6], vec![0b1100_0000_0011]));
     assert!(told.tops_m[0] > 0.09 && told.tops_m[10].is_nan(), "a keep-out has no top");
     assert_eq!(replica.ask(&question).unwrap().answer.occupied, told.occupied);
-    let above = GridQuestion { asked: Asked::default(), scope: scope([0.6, 1.0]) };
+    let above = GridQuestion { asked: QuestionScope::default(), scope: scope([0.6, 1.0]) };
     assert_eq!(client.project_grid(&map(), above).await.unwrap().answer.occupied, [0]);
     let ignoring = GridQuestion { asked: but_keep_outs(), ..question };
     assert_eq!(client.project_grid(&map(), ignoring).await.unwrap().answer.occupied, [0b11]);

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::map::{KeepOutName, KeepOutShape, MapName, Region};
 use mrol::planning::{Body, Link, Sphere, Surroundings};
-use mrol::service::{Asked, CheckAs, PoseCheck, PutKeepOut, Question};
+use mrol::service::{CheckAs, PoseCheck, PutKeepOut, Question, QuestionScope};
 use serde_json::Value;
 
 use crate::support::daemon::{Daemon, row};
@@ -45,7 +45,7 @@ fn at(x: f32, y: f32, z: f32) -> [f32; 7] {
 
 fn poses(answer: CheckAs) -> PoseCheck {
     let configurations = [at(0.55, 0.4, 0.05), at(0.55, 0.2, 0.05), at(-5.0, 0.0, 0.0)].concat();
-    let (asked, surroundings) = (Asked::default(), Surroundings::default());
+    let (asked, surroundings) = (QuestionScope::default(), Surroundings::default());
     PoseCheck { asked, body: ball(0.15), configurations, surroundings, answer }
 }
 
@@ -66,7 +66,7 @@ fn array<'a>(head: &Value, arrays: &'a [u8], name: &str) -> &'a [u8] {
     &arrays[at..at + bytes]
 }
 
-fn same<Q: Question>(replica: &Replica, question: &Q, told: &mrol::service::Answered<Q::Answer>)
+fn same<Q: Question>(replica: &Replica, question: &Q, told: &mrol::service::AtVersion<Q::Answer>)
 where
     Q::Answer: PartialEq,
 {
@@ -86,6 +86,6 @@ async fn row_and_crate() -> (Daemon, Client, Replica) {
 }
 
 /// The same question without keep-outs.
-fn but_keep_outs() -> Asked {
-    Asked { ignore_keep_outs: true, ..Asked::default() }
+fn but_keep_outs() -> QuestionScope {
+    QuestionScope { ignore_keep_outs: true, ..QuestionScope::default() }
 }

@@ -7,8 +7,8 @@ use mrol::geometry::Point;
 use mrol::map::Region;
 use mrol::planning::{BandFrom, GridArea, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol::service::{
-    Asked, CheckAs, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, Question, RayQuestion,
-    RaysToward, SphereCheck,
+    CheckAs, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, Question, QuestionScope,
+    RayQuestion, RaysToward, SphereCheck,
 };
 
 /// A replica of a part of the row, x from 0.3 to 1.5.
@@ -51,7 +51,7 @@ async fn a_replica_of_a_region_answers_what_lies_in_it() {
             told.push(agrees(&part, &check, &of_server, "configurations[0].links[0]"));
         }
         let spheres = SphereCheck {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             spheres: vec![Sphere { center_m: [x, 0.3, 0.05], radius_m: 0.15 }],
             sizes: vec![1],
             padding_m: 0.0,
@@ -61,7 +61,7 @@ async fn a_replica_of_a_region_answers_what_lies_in_it() {
         let of_server = client.check_spheres(&map(), spheres.clone()).await.unwrap().answer;
         assert_eq!(agrees(&part, &spheres, &of_server, "spheres[0]"), told[0]);
         let points = NearestQuestion {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             points: vec![Point::new(x, 0.3, 0.05)].into(),
             radius_m: 1.0,
             to: MeasuredTo::Cubes,
@@ -82,7 +82,7 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
     let (_daemon, client, _) = row_and_crate().await;
     let part = part_of(&client).await;
     let motion = |configurations: [[f32; 7]; 2], clearance_max_m| MotionCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         body: ball(0.1),
         configurations: configurations.concat(),
         lengths: vec![2],
@@ -112,8 +112,12 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
         ([0.1, 0.5, 0.05], [1.0, 0.0, 0.0], 0.5, false),
     ] {
         let toward = RaysToward::Directions { directions: points(direction), range_m };
-        let rays =
-            RayQuestion { asked: Asked::default(), origins: points(from), toward, unknown: Unknown::Free };
+        let rays = RayQuestion {
+            asked: QuestionScope::default(),
+            origins: points(from),
+            toward,
+            unknown: Unknown::Free,
+        };
         let of_server = client.cast_rays(&map(), rays.clone()).await.unwrap().answer;
         assert_eq!(agrees(&part, &rays, &of_server, "rays[0]"), is_known, "{from:?} {direction:?}");
     }
@@ -125,7 +129,7 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
     ] {
         let area = area.map_or(GridArea::Occupied, |[min_m, max_m]| GridArea::Rectangle { min_m, max_m });
         let question = GridQuestion {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             scope: GridScope { area, band_m, band_from: BandFrom::Map, cell_m: None, tells_unknown: false },
         };
         let own = part.ask(&question);

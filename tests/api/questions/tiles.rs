@@ -5,7 +5,7 @@ use mrol::geometry::Pose;
 use mrol::map::RobotName;
 use mrol::mapping::Guess;
 use mrol::planning::{BandFrom, Grid, GridArea};
-use mrol::service::{Asked, GridQuestion, GridScope, PointCloud, ScanRequest};
+use mrol::service::{GridQuestion, GridScope, PointCloud, QuestionScope, ScanRequest};
 use mrol::wire::pb;
 use prost::Message;
 use serde_json::json;
@@ -15,7 +15,7 @@ use crate::support::daemon::{Daemon, json_of};
 
 fn question(area: GridArea, cell_m: Option<f64>, tells_unknown: bool) -> GridQuestion {
     let scope = GridScope { area, band_m: [-0.5, 0.5], band_from: BandFrom::Map, cell_m, tells_unknown };
-    GridQuestion { asked: Asked::default(), scope }
+    GridQuestion { asked: QuestionScope::default(), scope }
 }
 
 fn rectangle(min_m: [f64; 2], max_m: [f64; 2]) -> GridArea {

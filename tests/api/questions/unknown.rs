@@ -5,8 +5,8 @@ use super::{array, at, ball, framed, map, parts, poses, row_of_voxels, same};
 use mrol::geometry::Point;
 use mrol::planning::{BandFrom, Frontiers, GridArea, PointState, Sphere, Surroundings, Unknown};
 use mrol::service::{
-    Asked, CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck, PoseCheck,
-    RayQuestion, RaysToward, SphereCheck,
+    CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck, PoseCheck,
+    QuestionScope, RayQuestion, RaysToward, SphereCheck,
 };
 use serde_json::json;
 
@@ -16,7 +16,7 @@ use crate::support::daemon::json_of;
 async fn points_that_nobody_saw_are_unknown_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let points: Vec<Point> = [[0.55, 0.05, 0.05], [0.55, 0.35, 0.05]].map(Point::from).to_vec();
-    let question = ClassifyQuestion { asked: Asked::default(), points: points.clone().into() };
+    let question = ClassifyQuestion { asked: QuestionScope::default(), points: points.clone().into() };
     let told = client.classify_points(&map(), question.clone()).await.unwrap();
     assert_eq!([0, 1].map(|i| told.answer.state(i)), [PointState::Occupied, PointState::Unknown]);
     same(&replica, &question, &told);
@@ -50,7 +50,7 @@ async fn what_nobody_saw_is_met_where_it_counts_as_occupied() {
     same(&replica, &check, &told);
     let configurations = vec![at(0.55, 0.4, 0.05), at(0.55, 0.6, 0.05)];
     let motion = MotionCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         body: ball(0.1),
         configurations: configurations.concat(),
         lengths: vec![2],
@@ -62,7 +62,7 @@ async fn what_nobody_saw_is_met_where_it_counts_as_occupied() {
     assert_eq!(told.answer[0].first_hit, Some(0.0));
     same(&replica, &motion, &told);
     let spheres = SphereCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         spheres: vec![Sphere { center_m: [0.55, 0.5, 0.05], radius_m: 0.1 }],
         sizes: vec![1],
         padding_m: 0.0,
@@ -74,7 +74,7 @@ async fn what_nobody_saw_is_met_where_it_counts_as_occupied() {
     same(&replica, &spheres, &told);
     let points = |of: &[[f32; 3]]| of.iter().copied().map(Point::from).collect::<Vec<_>>().into();
     let rays = RayQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         origins: points(&[[0.55, 0.45, 0.05]]),
         toward: RaysToward::Directions { directions: points(&[[0.0, 1.0, 0.0]]), range_m: f64::INFINITY },
         unknown: Unknown::Occupied,
@@ -106,7 +106,7 @@ async fn what_nobody_saw_is_met_where_it_counts_as_occupied() {
 async fn a_map_that_nobody_saw_has_no_frontier_and_no_free_cell() {
     let (daemon, client, replica) = row_of_voxels().await;
     let question = FrontierQuestion {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         min_m: [-1.0; 3],
         max_m: [1.0; 3],
         size_min: Some(1),
@@ -131,7 +131,7 @@ async fn a_map_that_nobody_saw_has_no_frontier_and_no_free_cell() {
         cell_m: Some(0.2),
         tells_unknown: true,
     };
-    let question = GridQuestion { asked: Asked::default(), scope };
+    let question = GridQuestion { asked: QuestionScope::default(), scope };
     let told = client.project_grid(&map(), question).await.unwrap();
     assert_eq!(
         (0..4).map(|cell| told.answer.is_unknown(cell)).collect::<Vec<_>>(),

@@ -2,7 +2,7 @@
 
 use super::{at, framed, map, poses, row_and_crate};
 
-use mrol::service::{Asked, CheckAs, PoseCheck};
+use mrol::service::{CheckAs, PoseCheck, QuestionScope};
 use serde_json::{Value, json};
 
 use crate::support::daemon::json_of;
@@ -40,7 +40,7 @@ async fn every_question_takes_a_level_a_revision_and_the_uuid_of_the_map() {
     }
     // In a stream each batch says so for itself.
     let batch = |ignore_keep_outs| PoseCheck {
-        asked: Asked { ignore_keep_outs, min_revision: Some(2), ..Asked::default() },
+        asked: QuestionScope { ignore_keep_outs, min_revision: Some(2), ..QuestionScope::default() },
         configurations: at(0.55, 1.5, 0.05).to_vec(),
         ..poses(CheckAs::Colliding)
     };
@@ -49,6 +49,9 @@ async fn every_question_takes_a_level_a_revision_and_the_uuid_of_the_map() {
     for words in [[1], [0]] {
         assert_eq!(tokio_stream::StreamExt::next(&mut answers).await.unwrap().unwrap().answer.words(), words);
     }
-    let late = PoseCheck { asked: Asked { min_revision: Some(3), ..Asked::default() }, ..batch(false) };
+    let late = PoseCheck {
+        asked: QuestionScope { min_revision: Some(3), ..QuestionScope::default() },
+        ..batch(false)
+    };
     assert!(replica.ask(&late).unwrap_err().to_string().contains("the copy is at 2"));
 }

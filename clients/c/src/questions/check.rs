@@ -1,7 +1,7 @@
 //! Does a body fit at these configurations? Do these spheres meet anything?
 
 use mrol_client::planning::{Clearance, Hit, NUMBERS_PER_POSE};
-use mrol_client::service::{Answered, CheckAs, Collisions};
+use mrol_client::service::{AtVersion, CheckAs, Collisions};
 use mrol_client::voxel::VoxelKey;
 
 use super::regions::{RegionNumbers, surroundings_but};
@@ -131,7 +131,7 @@ impl Arrays {
         }
     }
 
-    fn write(&self, answered: &Answered<Collisions>) -> Answer {
+    fn write(&self, answered: &AtVersion<Collisions>) -> Answer {
         let collisions = &answered.answer;
         let words = collisions.words();
         if let Some(colliding) = &self.colliding {

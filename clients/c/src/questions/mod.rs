@@ -19,7 +19,7 @@ pub(crate) use rays::{RayPlaces, RayQuestion};
 
 use mrol_client::map::{KeepOutName, NAME_LENGTH_MAX};
 use mrol_client::planning::Unknown;
-use mrol_client::service::Asked;
+use mrol_client::service::QuestionScope;
 
 use crate::abi::{Answer, Error, ReplicaHandle};
 use crate::failure::Failure;
@@ -77,10 +77,10 @@ pub(crate) struct Scope {
 impl Scope {
     /// What the question `name` has in common with others. A copy is asked as it is: programs wait for revisions
     /// beforehand.
-    fn asked(&self, name: &str) -> Result<Asked, Failure> {
+    fn asked(&self, name: &str) -> Result<QuestionScope, Failure> {
         check_reserved(&self.reserved, &format!("{name}.scope"))?;
         let ignore_keep_outs = memory::flag(self.ignore_keep_outs, "ignore_keep_outs")?;
-        Ok(Asked { level: self.level, ignore_keep_outs, ..Asked::default() })
+        Ok(QuestionScope { level: self.level, ignore_keep_outs, ..QuestionScope::default() })
     }
 }
 

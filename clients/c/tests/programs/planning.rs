@@ -7,8 +7,8 @@ use mrol_client::Client;
 use mrol_client::map::{KeepOutName, KeepOutShape, Region};
 use mrol_client::planning::{BandFrom, Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol_client::service::{
-    Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
-    PoseCheck, PutKeepOut, RayQuestion, RaysToward, SphereCheck,
+    AtVersion, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
+    PoseCheck, PutKeepOut, QuestionScope, RayQuestion, RaysToward, SphereCheck,
 };
 
 use super::{Driver, Linked, Server, insert, make_map, map, row};
@@ -79,7 +79,7 @@ impl Line {
     }
 }
 
-fn collisions(told: Answered<Collisions>) -> String {
+fn collisions(told: AtVersion<Collisions>) -> String {
     let (words, checked) = (told.answer.words(), told.answer.checked());
     let line = Line::of(told.version, checked, ones(&words)).bits(&words, checked);
     match told.answer {
@@ -111,7 +111,7 @@ const KINDS: [(u32, CheckAs, &str); 4] = [
     (2, CheckAs::Clearance { most_m: Some(0.25) }, "0.25"),
 ];
 
-async fn bodies(driver: &mut Driver, client: &Client, asked: Asked) {
+async fn bodies(driver: &mut Driver, client: &Client, asked: QuestionScope) {
     let (level, numbers) = (asked.level, configurations());
     let spheres: Vec<f32> = numbers.chunks(7).flat_map(|pose| [pose[0], pose[1], 0.05, 0.13]).collect();
     for (kind, answer, most) in KINDS {
@@ -144,7 +144,7 @@ async fn bodies(driver: &mut Driver, client: &Client, asked: Asked) {
     }
 }
 
-async fn motions(driver: &mut Driver, client: &Client, asked: Asked) {
+async fn motions(driver: &mut Driver, client: &Client, asked: QuestionScope) {
     for clearance_max_m in [None, Some(0.25)] {
         let check = MotionCheck {
             asked,
@@ -171,7 +171,7 @@ async fn motions(driver: &mut Driver, client: &Client, asked: Asked) {
     }
 }
 
-async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
+async fn rays_and_points(driver: &mut Driver, client: &Client, asked: QuestionScope) {
     let origins: Vec<[f32; 3]> = (0..20).map(|i| [i as f32 * 0.2 - 1.0, 1.0, 0.05]).collect();
     let directions: Vec<[f32; 3]> =
         (0..20).map(|i| if i % 3 == 0 { [0.0, 1.0, 0.0] } else { [0.6, -0.8, 0.0] }).collect();
@@ -204,7 +204,7 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
     }
 }
 
-async fn grids(driver: &mut Driver, client: &Client, asked: Asked) {
+async fn grids(driver: &mut Driver, client: &Client, asked: QuestionScope) {
     let scope = GridScope {
         area: GridArea::Occupied,
         band_m: [-1.0, 2.0],
@@ -221,7 +221,7 @@ async fn grids(driver: &mut Driver, client: &Client, asked: Asked) {
     assert_eq!(driver.told(&format!("grid {} -1 2", asked.level)), line.0);
 }
 
-async fn questions(driver: &mut Driver, client: &Client, asked: Asked) {
+async fn questions(driver: &mut Driver, client: &Client, asked: QuestionScope) {
     bodies(driver, client, asked).await;
     motions(driver, client, asked).await;
     rays_and_points(driver, client, asked).await;
@@ -237,7 +237,7 @@ async fn a_c_planner_is_answered_as_grpc_answers(linked: Linked) {
     assert_eq!(driver.told(&format!("open {} a", server.grpc)), "MROL_OK");
     assert_eq!(driver.told(BODY), "MROL_OK");
     for level in 0..3 {
-        questions(&mut driver, &client, Asked { level, ..Asked::default() }).await;
+        questions(&mut driver, &client, QuestionScope { level, ..QuestionScope::default() }).await;
     }
     let ball = KeepOutShape::of_region(Region::ball([0.9, 0.45, 0.05], 0.16).unwrap()).unwrap();
     let name = KeepOutName::new("crate").unwrap();
@@ -247,7 +247,7 @@ async fn a_c_planner_is_answered_as_grpc_answers(linked: Linked) {
     assert!(driver.told("nearest 0 0 1 1 0.9 0.7 0.05").ends_with(" crate"));
     for ignore_keep_outs in [false, true] {
         driver.does(&format!("ignore {}", u8::from(ignore_keep_outs)));
-        questions(&mut driver, &client, Asked { ignore_keep_outs, ..Asked::default() }).await;
+        questions(&mut driver, &client, QuestionScope { ignore_keep_outs, ..QuestionScope::default() }).await;
     }
     let refused = driver.told("nearest 0 0 100 1 0 0 0");
     assert!(refused.starts_with("MROL_INVALID_ARGUMENT bad_radius: radius_m must lie above 0"), "{refused}");

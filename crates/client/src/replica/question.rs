@@ -5,7 +5,7 @@ use super::error::ReplicaError;
 use super::handle::{Replica, check_level};
 use mrol_map::util::StopSignal;
 use mrol_service::{
-    Answered, Asked, KnownPart, Limits, MapVersion, Question, QuestionedMap, Reason, ServiceError,
+    AtVersion, KnownPart, Limits, MapVersion, Question, QuestionScope, QuestionTarget, Reason, ServiceError,
 };
 
 impl Replica {
@@ -16,16 +16,16 @@ impl Replica {
     /// `ReplicaStale` of a copy that is older than the options allow; for what makes no question; a level that is none;
     /// another uuid than the map's; a `min_revision` that the copy has not; of a copy of a region, `PointOutOfRange`
     /// where what lies beyond the region could change the answer.
-    pub fn ask<Q: Question>(&self, question: &Q) -> Result<Answered<Q::Answer>, ReplicaError> {
+    pub fn ask<Q: Question>(&self, question: &Q) -> Result<AtVersion<Q::Answer>, ReplicaError> {
         self.shared.check_age(self.age_max)?;
         let limits = Limits::default();
         question.check(&limits)?;
         let Copied { map, map_uuid, planner } = self.shared.copied.read().clone();
-        let asked @ Asked { level, .. } = *question.asked();
+        let asked @ QuestionScope { level, .. } = *question.asked();
         check_level(level, &map)?;
         check_uuid(&asked, map_uuid)?;
         check_revision(asked.min_revision, map.revision())?;
-        let questioned = QuestionedMap::new(&map, &planner, self.field_bytes_max);
+        let questioned = QuestionTarget::new(&map, &planner, self.field_bytes_max);
         let (answer, version) = question.answer_from(&questioned, &limits, StopSignal::NEVER)?;
         if let Some(region) = self.region {
             question.check_known(&answer, &KnownPart::of(region, map.lattice(), level))?;
@@ -33,11 +33,11 @@ impl Replica {
         // The hash of a part is not the map's.
         let content_hash = self.region.is_none().then_some(version.hash);
         let version = MapVersion { revision: version.revision, map_uuid, content_hash };
-        Ok(Answered { answer, version })
+        Ok(AtVersion { answer, version })
     }
 }
 
-fn check_uuid(asked: &Asked, map_uuid: uuid::Uuid) -> Result<(), ServiceError> {
+fn check_uuid(asked: &QuestionScope, map_uuid: uuid::Uuid) -> Result<(), ServiceError> {
     if asked.map_uuid.is_none_or(|uuid| uuid == map_uuid) {
         return Ok(());
     }

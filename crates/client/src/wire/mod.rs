@@ -30,7 +30,7 @@ pub use failure::{REASON, status_code, status_of};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::{create_map, nanoseconds};
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
-pub use question::{QuestionMessage, check_body, question_of};
+pub use question::{QuestionMessage, check_body, parse_question};
 pub use scan::gravity_in_sensor;
 pub use values::{InField, bitmap_of, bytes_of, required, uuid_from};
 pub use watch::framed;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::asked::{Answered, Asked};
 use super::planner_question::Question;
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::{AtVersion, QuestionScope};
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::map_service::{Inner, MapService};
@@ -31,7 +31,7 @@ const CHECKED_INLINE_BYTES: usize = 64 << 10;
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
-    /// Answers a question of a planner at the state that it names, see [`Answered`]: a small one where it arrives,
+    /// Answers a question of a planner at the state that it names, see [`AtVersion`]: a small one where it arrives,
     /// others on a thread for planners.
     ///
     /// # Errors
@@ -42,10 +42,10 @@ impl MapService {
         &self,
         map: &MapName,
         question: Q,
-    ) -> Result<Answered<Q::Answer>, ServiceError> {
+    ) -> Result<AtVersion<Q::Answer>, ServiceError> {
         let work = async {
             let map = self.map(map).await?;
-            let Asked { level, min_revision, map_uuid, .. } = *question.asked();
+            let QuestionScope { level, min_revision, map_uuid, .. } = *question.asked();
             let question = self.checked(question).await?;
             map.check_level(level)?;
             map.check_uuid(map_uuid)?;
@@ -95,7 +95,7 @@ impl Inner {
         &self,
         map: &HostedMap,
         question: &Q,
-    ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
+    ) -> Option<Result<AtVersion<Q::Answer>, ServiceError>> {
         let limits = &self.settings.limits;
         let is_small =
             question.work_ns() <= INLINE_NS && bytes_of(question, &map.map, limits) <= INLINE_BYTES;
@@ -123,19 +123,19 @@ fn bytes_of<Q: Question>(question: &Q, map: &MultiResolutionMap, limits: &Limits
 }
 
 impl HostedMap {
-    fn questioned(&self, limits: &Limits) -> QuestionedMap<'_> {
-        QuestionedMap::new(&self.map, &self.planner, limits.planning_field_bytes_max)
+    fn questioned(&self, limits: &Limits) -> QuestionTarget<'_> {
+        QuestionTarget::new(&self.map, &self.planner, limits.planning_field_bytes_max)
     }
 
     fn answer_question<Q: Question>(
         &self,
-        questioned: &QuestionedMap<'_>,
+        questioned: &QuestionTarget<'_>,
         question: &Q,
         limits: &Limits,
         stop: StopSignal<'_>,
-    ) -> Result<Answered<Q::Answer>, ServiceError> {
+    ) -> Result<AtVersion<Q::Answer>, ServiceError> {
         let (answer, version) = question.answer_from(questioned, limits, stop)?;
-        Ok(Answered { answer, version: self.version(version) })
+        Ok(AtVersion { answer, version: self.version(version) })
     }
 }
 
@@ -159,7 +159,7 @@ mod tests {
     fn pose_check() -> PoseCheck {
         let spheres = vec![Sphere { center_m: [0.0; 3], radius_m: 0.1 }];
         PoseCheck {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             body: Arc::new(Body::new(vec![Link { spheres, ..Link::default() }]).unwrap()),
             configurations: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
             surroundings: Surroundings::ALL_VOXELS,
@@ -173,7 +173,7 @@ mod tests {
         let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
         let check = pose_check();
         let (map, planner) = (Arc::new(map), OnceLock::new());
-        let map = QuestionedMap::new(&map, &planner, field_bytes_max);
+        let map = QuestionTarget::new(&map, &planner, field_bytes_max);
         let (answer, _) = check.answer_from(&map, &Limits::default(), StopSignal::NEVER).unwrap();
         assert_eq!(answer.words(), [0]);
         map.planner().field_bytes()
@@ -183,7 +183,7 @@ mod tests {
     fn rays(count: usize) -> RayQuestion {
         let toward = RaysToward::Ends(PointCloud::from(vec![Point::new(1.0, 0.0, 5.0); count]));
         RayQuestion {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             origins: vec![Point::new(0.0, 0.0, 5.0)].into(),
             toward,
             unknown: Unknown::Free,

@@ -1,9 +1,9 @@
 //! Points as what is known of them: occupied, free, or unknown.
 
-use super::asked::Asked;
 use super::known::KnownPart;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::request::PointCloud;
@@ -15,7 +15,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClassifyQuestion {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// The points, meters in the map frame.
     pub points: PointCloud,
 }
@@ -30,7 +30,7 @@ impl Question for ClassifyQuestion {
 
     const OPERATION: &'static str = "ClassifyPoints";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -53,7 +53,7 @@ impl Question for ClassifyQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(PointStates, ContentVersion), ServiceError> {
@@ -119,7 +119,7 @@ mod tests {
     }
 
     fn question(points: Vec<Point>) -> ClassifyQuestion {
-        ClassifyQuestion { asked: Asked::default(), points: points.into() }
+        ClassifyQuestion { asked: QuestionScope::default(), points: points.into() }
     }
 
     #[test]
@@ -127,7 +127,7 @@ mod tests {
         let map =
             MultiResolutionMap::restore(MapSettings::new(1.0, 1), MapContents::at(1, VoxelSet::default()));
         let (map, planner) = (Arc::new(map.unwrap()), OnceLock::new());
-        let questioned = QuestionedMap::new(&map, &planner, 0);
+        let questioned = QuestionTarget::new(&map, &planner, 0);
         let point = |x: usize| Point::new(x as f32 + 0.5, 0.5, 0.5);
         // Voxel 0 is occupied during the first part, voxel 1 during the second.
         let points =
@@ -150,7 +150,7 @@ mod tests {
         let map =
             MultiResolutionMap::restore(MapSettings::new(1.0, 1), MapContents::at(7, VoxelSet::default()));
         let (map, planner) = (Arc::new(map.unwrap()), OnceLock::new());
-        let questioned = QuestionedMap::new(&map, &planner, 0);
+        let questioned = QuestionTarget::new(&map, &planner, 0);
         let ask = |points| question(points).answer_from(&questioned, &Limits::default(), StopSignal::NEVER);
         let mut points = vec![Point::new(0.0, 0.0, 0.0); POINTS_PER_PART + 3];
         points[POINTS_PER_PART + 1] = Point::new(f32::NAN, 0.0, 0.0);

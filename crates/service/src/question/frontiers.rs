@@ -1,9 +1,9 @@
 //! Frontiers: where free space ends and nothing is known beyond.
 
-use super::asked::Asked;
 use super::known::KnownPart;
 use super::planner_question::Question;
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::work::check_not_stopped;
@@ -18,7 +18,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrontierQuestion {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// Smallest coordinates of the box that is looked into, meters.
     pub min_m: [f64; 3],
     /// Largest coordinates.
@@ -48,7 +48,7 @@ impl Question for FrontierQuestion {
 
     const OPERATION: &'static str = "ListFrontiers";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -71,7 +71,7 @@ impl Question for FrontierQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Frontiers, ContentVersion), ServiceError> {

@@ -1,9 +1,9 @@
 //! The map from above, as a 2-D grid.
 
-use super::asked::Asked;
 use super::known::KnownPart;
 use super::planner_question::Question;
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::work::check_not_stopped;
@@ -16,7 +16,7 @@ use mrol_map::voxel::Lattice;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridQuestion {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// What the grid covers, and how finely.
     pub scope: GridScope,
 }
@@ -80,7 +80,7 @@ impl Question for GridQuestion {
     const WAY_OUT: &'static str = "ask for the grid in tiles (StreamGrid, POST /v1/maps/{map}/grid/tiles), for larger cells \
                                    (cell_m) or a smaller area, or raise limits.question_time_max_s";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -110,7 +110,7 @@ impl Question for GridQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Grid, ContentVersion), ServiceError> {
@@ -177,7 +177,8 @@ mod tests {
         let band_m = [f64::NEG_INFINITY, f64::INFINITY];
         let (area, band_from) = (GridArea::Occupied, BandFrom::Map);
         let scope = GridScope { area, band_m, band_from, cell_m: None, tells_unknown: false };
-        let error = service.ask(&map, GridQuestion { asked: Asked::default(), scope }).await.unwrap_err();
+        let error =
+            service.ask(&map, GridQuestion { asked: QuestionScope::default(), scope }).await.unwrap_err();
         assert_eq!(error.reason, Reason::TimeLimit);
         for way_out in ["StreamGrid", "/grid/tiles", "cell_m", "limits.question_time_max_s"] {
             assert!(error.message.contains(way_out), "{}", error.message);

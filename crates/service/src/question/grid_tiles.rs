@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 
 use tokio_stream::Stream;
 
-use super::asked::{Answered, Asked};
 use super::grid::{GridQuestion, GridScope};
 use super::known::KnownPart;
 use super::planner_question::Question;
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::{AtVersion, QuestionScope};
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::map_service::MapService;
@@ -45,7 +45,7 @@ pub struct GridTile {
     /// True of the last tile.
     pub is_last: bool,
     /// The tile's cells.
-    pub grid: Answered<Grid>,
+    pub grid: AtVersion<Grid>,
 }
 
 /// A grid in tiles, from the smallest y on, in each row from the smallest x: each is drawn when the one before it was
@@ -72,7 +72,7 @@ impl MapService {
     pub async fn grid_tiles(&self, map: &MapName, question: GridQuestion) -> Result<GridTiles, ServiceError> {
         let extent = self.ask(map, ExtentQuestion(question)).await?;
         // Every tile is of the map that was measured.
-        let asked = Asked { map_uuid: Some(extent.version.map_uuid), ..question.asked };
+        let asked = QuestionScope { map_uuid: Some(extent.version.map_uuid), ..question.asked };
         let (service, map, question) = (self.clone(), map.clone(), GridQuestion { asked, ..question });
         let extent = extent.answer;
         // All tiles count from one floor, which stays until the last one is taken.
@@ -194,7 +194,7 @@ impl Question for ExtentQuestion {
 
     const OPERATION: &'static str = "StreamGrid";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.0.asked
     }
 
@@ -221,7 +221,7 @@ impl Question for ExtentQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(GridExtent, ContentVersion), ServiceError> {
@@ -242,7 +242,7 @@ impl Question for TileQuestion {
 
     const OPERATION: &'static str = "StreamGrid";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.question.asked
     }
 
@@ -260,7 +260,7 @@ impl Question for TileQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Grid, ContentVersion), ServiceError> {

@@ -1,7 +1,6 @@
 //! Questions of planners: each is answered from a view of a whole map, the server's or a replica's.
 
 mod ask;
-mod asked;
 mod check;
 mod classify;
 mod frontiers;
@@ -13,11 +12,11 @@ mod nearest;
 mod pieces;
 mod planner_question;
 mod poses;
-mod questioned_map;
+mod question_target;
 mod rays;
+mod scope;
 mod spheres;
 
-pub use asked::{Answered, Asked};
 pub use check::{CheckAs, Collisions};
 pub use classify::ClassifyQuestion;
 pub use frontiers::{FRONTIERS_MAX_DEFAULT, FrontierQuestion};
@@ -28,6 +27,7 @@ pub use motions::MotionCheck;
 pub use nearest::NearestQuestion;
 pub use planner_question::Question;
 pub use poses::PoseCheck;
-pub use questioned_map::QuestionedMap;
+pub use question_target::QuestionTarget;
 pub use rays::{RayQuestion, RaysToward};
+pub use scope::{AtVersion, QuestionScope};
 pub use spheres::SphereCheck;

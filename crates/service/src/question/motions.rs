@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::asked::Asked;
 use super::check::check_ignored;
 use super::known::KnownPart;
 use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::ended_early;
@@ -22,7 +22,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionCheck {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// The body.
     pub body: Arc<Body>,
     /// The configurations of all motions, one after the other, as those of a [`PoseCheck`](super::PoseCheck).
@@ -48,7 +48,7 @@ impl Question for MotionCheck {
 
     const OPERATION: &'static str = "CheckMotions";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -76,7 +76,7 @@ impl Question for MotionCheck {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Vec<MotionAnswer>, ContentVersion), ServiceError> {
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn what_is_made_of_motions_counts_before_it_is_made() {
         let check = |motions: usize| MotionCheck {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             body: Arc::new(
                 Body::new(vec![Link { points: vec![Point::new(0.0, 0.0, 0.0)], ..Link::default() }]).unwrap(),
             ),

@@ -1,10 +1,10 @@
 //! The nearest voxel of points.
 
-use super::asked::Asked;
 use super::known::KnownPart;
 use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::request::PointCloud;
@@ -17,7 +17,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct NearestQuestion {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// The points, meters in the map frame.
     pub points: PointCloud,
     /// How far to look, meters: above 0, at most [`RADIUS_VOXELS_MAX`](mrol_map::planning::RADIUS_VOXELS_MAX) voxels.
@@ -36,7 +36,7 @@ impl Question for NearestQuestion {
 
     const OPERATION: &'static str = "FindNearest";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -58,7 +58,7 @@ impl Question for NearestQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(NearestVoxels, ContentVersion), ServiceError> {

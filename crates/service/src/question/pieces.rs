@@ -15,7 +15,7 @@ const PIECE_NS: usize = 1_000_000;
 const WORD: usize = u64::BITS as usize;
 
 /// What a piece is answered from.
-pub(super) trait AtVersion {
+pub(super) trait HasVersion {
     /// The version that it shows.
     fn version(&self) -> ContentVersion;
 }
@@ -60,7 +60,7 @@ impl Pieces {
     ///
     /// # Errors
     /// How the question was stopped; those of `view` and of `answer`.
-    pub(super) fn answered<V: AtVersion, A: Joined>(
+    pub(super) fn answered<V: HasVersion, A: Joined>(
         self,
         stop: StopSignal<'_>,
         view: impl Fn() -> Result<V, ServiceError>,
@@ -87,13 +87,13 @@ impl Pieces {
     }
 }
 
-impl AtVersion for WholeView<'_> {
+impl HasVersion for WholeView<'_> {
     fn version(&self) -> ContentVersion {
         self.view.version()
     }
 }
 
-impl AtVersion for PlanningView<'_> {
+impl HasVersion for PlanningView<'_> {
     fn version(&self) -> ContentVersion {
         PlanningView::version(self)
     }

@@ -2,9 +2,9 @@
 
 use std::fmt::Debug;
 
-use super::asked::Asked;
 use super::known::KnownPart;
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use mrol_map::map::{ContentVersion, MultiResolutionMap};
@@ -22,7 +22,7 @@ pub trait Question: Debug + Send + Sync + 'static {
     const WAY_OUT: &'static str = "ask about less at once, or raise that setting of limits";
 
     /// What it has in common with others.
-    fn asked(&self) -> &Asked;
+    fn asked(&self) -> &QuestionScope;
 
     /// Bytes of memory that its answer takes, at most.
     fn answer_bytes(&self, limits: &Limits) -> usize;
@@ -55,7 +55,7 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// that the time is up, where `map` must not be waited for and would have to be.
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Self::Answer, ContentVersion), ServiceError>;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::asked::Asked;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::known::KnownPart;
 use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::ended_early;
@@ -21,7 +21,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseCheck {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// The body.
     pub body: Arc<Body>,
     /// Poses of its links in the map frame, configuration by configuration, link by link, each x y z qx qy qz qw.
@@ -64,7 +64,7 @@ impl Question for PoseCheck {
 
     const OPERATION: &'static str = "CheckPoses";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -86,7 +86,7 @@ impl Question for PoseCheck {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Collisions, ContentVersion), ServiceError> {

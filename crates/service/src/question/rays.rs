@@ -1,10 +1,10 @@
 //! Rays: what each meets first.
 
-use super::asked::Asked;
 use super::known::KnownPart;
 use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::{Reason, ServiceError};
 use crate::limits::Limits;
 use crate::request::PointCloud;
@@ -16,7 +16,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayQuestion {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// Where each ray begins, meters in the map frame: one point for each ray, or one for all of them.
     pub origins: PointCloud,
     /// Where each ray leads.
@@ -69,7 +69,7 @@ impl Question for RayQuestion {
 
     const OPERATION: &'static str = "CastRays";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -91,7 +91,7 @@ impl Question for RayQuestion {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(RayHits, ContentVersion), ServiceError> {

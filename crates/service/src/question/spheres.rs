@@ -1,11 +1,11 @@
 //! Do these spheres of the map frame meet voxels?
 
-use super::asked::Asked;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::known::KnownPart;
 use super::pieces::Pieces;
 use super::planner_question::{Question, check_elements};
-use super::questioned_map::QuestionedMap;
+use super::question_target::QuestionTarget;
+use super::scope::QuestionScope;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::ended_early;
@@ -19,7 +19,7 @@ use mrol_map::util::StopSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub struct SphereCheck {
     /// What it has in common with other questions.
-    pub asked: Asked,
+    pub asked: QuestionScope,
     /// The spheres, group by group.
     pub spheres: Vec<Sphere>,
     /// How many spheres each group has; a group is answered as one.
@@ -63,7 +63,7 @@ impl Question for SphereCheck {
 
     const OPERATION: &'static str = "CheckSpheres";
 
-    fn asked(&self) -> &Asked {
+    fn asked(&self) -> &QuestionScope {
         &self.asked
     }
 
@@ -86,7 +86,7 @@ impl Question for SphereCheck {
 
     fn answer_from(
         &self,
-        map: &QuestionedMap<'_>,
+        map: &QuestionTarget<'_>,
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Collisions, ContentVersion), ServiceError> {

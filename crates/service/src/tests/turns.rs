@@ -10,8 +10,8 @@ use crate::commit::CommitThreads;
 use crate::limits::{Limits, Marks};
 use crate::maps::HostedMap;
 use crate::question::{
-    Asked, CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck,
-    NearestQuestion, PoseCheck, Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck,
+    CheckAs, ClassifyQuestion, FrontierQuestion, GridQuestion, GridScope, MotionCheck, NearestQuestion,
+    PoseCheck, Question, QuestionScope, QuestionTarget, RayQuestion, RaysToward, SphereCheck,
 };
 use crate::request::{BlockForm, BlockRequest, WatchForm};
 use crate::resources::ResourceBudget;
@@ -63,7 +63,7 @@ fn seen_wall() -> MultiResolutionMap {
 /// How often a question gives way. What it is answered is the same where it does not, and of the revision before it.
 fn turns_of<Q: Question>(map: &Arc<MultiResolutionMap>, question: &Q) -> u64 {
     let (planner, limits) = (OnceLock::new(), Limits::default());
-    let questioned = QuestionedMap::new(map, &planner, limits.planning_field_bytes_max);
+    let questioned = QuestionTarget::new(map, &planner, limits.planning_field_bytes_max);
     let (alone, _) = question.answer_from(&questioned, &limits, StopSignal::NEVER).unwrap();
     let (turns, revision) = (ChangedBetween { map, turns: Cell::default() }, map.revision());
     let stop = StopSignal::NEVER.giving_way_by(&turns);
@@ -93,7 +93,7 @@ fn points(count: usize) -> Vec<Point> {
 #[test]
 fn every_kind_of_long_question_gives_way_between_its_parts_and_is_answered_the_same() {
     let map = Arc::new(seen_wall());
-    let (asked, surroundings) = (Asked::default(), Surroundings::default());
+    let (asked, surroundings) = (QuestionScope::default(), Surroundings::default());
     let check = |answer| PoseCheck {
         asked,
         body: body(),

@@ -1,11 +1,11 @@
 //! Points as what is known of them.
 
-use super::asked::{Of, answered, asked_of};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{InField, bitmap_of, count_from, required, words_of};
 use mrol_map::map::MapName;
 use mrol_map::planning::PointStates;
-use mrol_service::{Answered, ClassifyQuestion, ServiceError};
+use mrol_service::{AtVersion, ClassifyQuestion, ServiceError};
 
 impl TryFrom<pb::ClassifyPointsRequest> for Of<ClassifyQuestion> {
     type Error = ServiceError;
@@ -23,8 +23,8 @@ impl From<(&MapName, ClassifyQuestion)> for pb::ClassifyPointsRequest {
     }
 }
 
-impl From<Answered<PointStates>> for pb::ClassifyPointsResponse {
-    fn from(Answered { answer, version }: Answered<PointStates>) -> Self {
+impl From<AtVersion<PointStates>> for pb::ClassifyPointsResponse {
+    fn from(AtVersion { answer, version }: AtVersion<PointStates>) -> Self {
         let (points_occupied, points_free) = (answer.points_occupied() as u64, answer.points_free() as u64);
         let PointStates { points, occupied, free } = answer;
         Self {
@@ -38,7 +38,7 @@ impl From<Answered<PointStates>> for pb::ClassifyPointsResponse {
     }
 }
 
-impl TryFrom<pb::ClassifyPointsResponse> for Answered<PointStates> {
+impl TryFrom<pb::ClassifyPointsResponse> for AtVersion<PointStates> {
     type Error = ServiceError;
 
     fn try_from(response: pb::ClassifyPointsResponse) -> Result<Self, ServiceError> {

@@ -1,11 +1,11 @@
 //! Frontiers.
 
-use super::asked::{Of, answered, asked_of};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{InField, count_from, required};
 use mrol_map::map::MapName;
 use mrol_map::planning::{Frontier, FrontierView, Frontiers};
-use mrol_service::{Answered, FrontierQuestion, ServiceError};
+use mrol_service::{AtVersion, FrontierQuestion, ServiceError};
 
 impl TryFrom<pb::ListFrontiersRequest> for Of<FrontierQuestion> {
     type Error = ServiceError;
@@ -28,15 +28,15 @@ impl From<(&MapName, FrontierQuestion)> for pb::ListFrontiersRequest {
     }
 }
 
-impl From<Answered<Frontiers>> for pb::ListFrontiersResponse {
-    fn from(Answered { answer, version }: Answered<Frontiers>) -> Self {
+impl From<AtVersion<Frontiers>> for pb::ListFrontiersResponse {
+    fn from(AtVersion { answer, version }: AtVersion<Frontiers>) -> Self {
         let Frontiers { frontiers, frontiers_total, voxels_total } = answer;
         let frontiers = frontiers.into_iter().map(Into::into).collect();
         Self { frontiers, frontiers_total, voxels_total, version: Some(version.into()) }
     }
 }
 
-impl TryFrom<pb::ListFrontiersResponse> for Answered<Frontiers> {
+impl TryFrom<pb::ListFrontiersResponse> for AtVersion<Frontiers> {
     type Error = ServiceError;
 
     fn try_from(response: pb::ListFrontiersResponse) -> Result<Self, ServiceError> {

@@ -1,11 +1,11 @@
 //! The map from above.
 
-use super::asked::{Of, answered, asked_of};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, required, words_of};
 use mrol_map::map::MapName;
 use mrol_map::planning::{BandFrom, Grid, GridArea};
-use mrol_service::{Answered, GridQuestion, GridScope, GridTile, Reason, ServiceError};
+use mrol_service::{AtVersion, GridQuestion, GridScope, GridTile, Reason, ServiceError};
 
 impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
     type Error = ServiceError;
@@ -62,8 +62,8 @@ impl From<BandFrom> for pb::BandFrom {
     }
 }
 
-impl From<Answered<Grid>> for pb::ProjectGridResponse {
-    fn from(Answered { answer, version }: Answered<Grid>) -> Self {
+impl From<AtVersion<Grid>> for pb::ProjectGridResponse {
+    fn from(AtVersion { answer, version }: AtVersion<Grid>) -> Self {
         let cells = answer.cells();
         let Grid {
             cell_m,
@@ -94,7 +94,7 @@ impl From<Answered<Grid>> for pb::ProjectGridResponse {
     }
 }
 
-impl TryFrom<pb::ProjectGridResponse> for Answered<Grid> {
+impl TryFrom<pb::ProjectGridResponse> for AtVersion<Grid> {
     type Error = ServiceError;
 
     fn try_from(response: pb::ProjectGridResponse) -> Result<Self, ServiceError> {

@@ -1,6 +1,6 @@
 //! Messages that ask a question: the body and the regions that they name, and the question that each makes.
 
-use super::asked::Of;
+use super::scope::Of;
 use crate::wire::pb;
 use mrol_service::{Limits, ServiceError};
 
@@ -25,7 +25,7 @@ pub trait QuestionMessage: prost::Message {
 }
 
 /// The question of a message, with the map that it is about. Of a body of more parts than may be, nothing is made.
-pub fn question_of<M: QuestionMessage, Q>(message: M, limits: &Limits) -> Result<Of<Q>, ServiceError>
+pub fn parse_question<M: QuestionMessage, Q>(message: M, limits: &Limits) -> Result<Of<Q>, ServiceError>
 where
     Of<Q>: TryFrom<M, Error = ServiceError>,
 {

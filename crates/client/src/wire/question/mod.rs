@@ -1,6 +1,5 @@
 //! Questions of planners and their answers (`planning.proto`).
 
-mod asked;
 mod body;
 mod classify;
 mod frontiers;
@@ -11,5 +10,6 @@ mod motions;
 mod nearest;
 mod poses;
 mod rays;
+mod scope;
 
-pub use message::{QuestionMessage, check_body, question_of};
+pub use message::{QuestionMessage, check_body, parse_question};

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::asked::{Of, answered, asked_of};
 use super::body::{configurations_from, counts_from, ignored_of, surroundings_from};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{bitmap_of, bytes_of, count_from, numbers_of, required};
 use mrol_map::map::MapName;
 use mrol_map::planning::MotionAnswer;
-use mrol_service::{Answered, MotionCheck, ServiceError};
+use mrol_service::{AtVersion, MotionCheck, ServiceError};
 
 impl TryFrom<pb::CheckMotionsRequest> for Of<MotionCheck> {
     type Error = ServiceError;
@@ -45,8 +45,8 @@ impl From<(&MapName, MotionCheck)> for pb::CheckMotionsRequest {
     }
 }
 
-impl From<Answered<Vec<MotionAnswer>>> for pb::CheckMotionsResponse {
-    fn from(Answered { answer, version }: Answered<Vec<MotionAnswer>>) -> Self {
+impl From<AtVersion<Vec<MotionAnswer>>> for pb::CheckMotionsResponse {
+    fn from(AtVersion { answer, version }: AtVersion<Vec<MotionAnswer>>) -> Self {
         let mut words = vec![0u64; answer.len().div_ceil(64)];
         for (i, motion) in answer.iter().enumerate() {
             words[i / 64] |= u64::from(motion.is_free()) << (i % 64);
@@ -63,7 +63,7 @@ impl From<Answered<Vec<MotionAnswer>>> for pb::CheckMotionsResponse {
     }
 }
 
-impl TryFrom<pb::CheckMotionsResponse> for Answered<Vec<MotionAnswer>> {
+impl TryFrom<pb::CheckMotionsResponse> for AtVersion<Vec<MotionAnswer>> {
     type Error = ServiceError;
 
     fn try_from(response: pb::CheckMotionsResponse) -> Result<Self, ServiceError> {

@@ -1,14 +1,14 @@
 //! The nearest voxel of points.
 
-use super::asked::{Of, answered, asked_of};
 use super::keep_outs::{keep_outs_from, keep_outs_of};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{
     InField, bitmap_of, bytes_of, count_from, numbers_of, required, voxels_of, words_of,
 };
 use mrol_map::map::MapName;
 use mrol_map::planning::{MeasuredTo, NearestVoxels};
-use mrol_service::{Answered, NearestQuestion, Reason, ServiceError};
+use mrol_service::{AtVersion, NearestQuestion, Reason, ServiceError};
 
 impl TryFrom<pb::FindNearestRequest> for Of<NearestQuestion> {
     type Error = ServiceError;
@@ -45,8 +45,8 @@ impl From<MeasuredTo> for pb::MeasuredTo {
     }
 }
 
-impl From<Answered<NearestVoxels>> for pb::FindNearestResponse {
-    fn from(Answered { answer, version }: Answered<NearestVoxels>) -> Self {
+impl From<AtVersion<NearestVoxels>> for pb::FindNearestResponse {
+    fn from(AtVersion { answer, version }: AtVersion<NearestVoxels>) -> Self {
         let points = answer.len();
         let NearestVoxels { found, distances_m, voxels, away, keep_outs } = answer;
         Self {
@@ -61,7 +61,7 @@ impl From<Answered<NearestVoxels>> for pb::FindNearestResponse {
     }
 }
 
-impl TryFrom<pb::FindNearestResponse> for Answered<NearestVoxels> {
+impl TryFrom<pb::FindNearestResponse> for AtVersion<NearestVoxels> {
     type Error = ServiceError;
 
     fn try_from(response: pb::FindNearestResponse) -> Result<Self, ServiceError> {

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use super::asked::{Of, answered, asked_of};
 use super::body::{
     answer_from, answer_of, configurations_from, counts_from, ignored_of, spheres_bytes, spheres_from,
     surroundings_from,
 };
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{bytes_of, required};
 use mrol_map::map::MapName;
-use mrol_service::{Answered, Collisions, PoseCheck, ServiceError, SphereCheck};
+use mrol_service::{AtVersion, Collisions, PoseCheck, ServiceError, SphereCheck};
 
 impl TryFrom<pb::CheckPosesRequest> for Of<PoseCheck> {
     type Error = ServiceError;
@@ -81,13 +81,13 @@ impl From<(&MapName, SphereCheck)> for pb::CheckSpheresRequest {
 /// Makes the conversions of a response that has collisions and a version.
 macro_rules! has_collisions {
     ($($response:ident),+) => {
-        $(impl From<Answered<Collisions>> for pb::$response {
-            fn from(Answered { answer, version }: Answered<Collisions>) -> Self {
+        $(impl From<AtVersion<Collisions>> for pb::$response {
+            fn from(AtVersion { answer, version }: AtVersion<Collisions>) -> Self {
                 Self { collisions: Some(answer.into()), version: Some(version.into()) }
             }
         }
 
-        impl TryFrom<pb::$response> for Answered<Collisions> {
+        impl TryFrom<pb::$response> for AtVersion<Collisions> {
             type Error = ServiceError;
 
             fn try_from(response: pb::$response) -> Result<Self, ServiceError> {

@@ -1,15 +1,15 @@
 //! Rays.
 
-use super::asked::{Of, answered, asked_of};
 use super::body::unknown_from;
 use super::keep_outs::{keep_outs_from, keep_outs_of};
+use super::scope::{Of, answered, asked_of};
 use crate::wire::pb;
 use crate::wire::values::{
     InField, bitmap_of, bytes_of, count_from, numbers_of, required, voxels_of, words_of,
 };
 use mrol_map::map::MapName;
 use mrol_map::planning::RayHits;
-use mrol_service::{Answered, PointCloud, RayQuestion, RaysToward, Reason, ServiceError};
+use mrol_service::{AtVersion, PointCloud, RayQuestion, RaysToward, Reason, ServiceError};
 
 impl TryFrom<pb::CastRaysRequest> for Of<RayQuestion> {
     type Error = ServiceError;
@@ -46,8 +46,8 @@ impl From<(&MapName, RayQuestion)> for pb::CastRaysRequest {
     }
 }
 
-impl From<Answered<RayHits>> for pb::CastRaysResponse {
-    fn from(Answered { answer, version }: Answered<RayHits>) -> Self {
+impl From<AtVersion<RayHits>> for pb::CastRaysResponse {
+    fn from(AtVersion { answer, version }: AtVersion<RayHits>) -> Self {
         let (rays, hits) = (answer.len(), answer.hits());
         let RayHits { hit, distances_m, voxels, keep_outs } = answer;
         Self {
@@ -62,7 +62,7 @@ impl From<Answered<RayHits>> for pb::CastRaysResponse {
     }
 }
 
-impl TryFrom<pb::CastRaysResponse> for Answered<RayHits> {
+impl TryFrom<pb::CastRaysResponse> for AtVersion<RayHits> {
     type Error = ServiceError;
 
     fn try_from(response: pb::CastRaysResponse) -> Result<Self, ServiceError> {

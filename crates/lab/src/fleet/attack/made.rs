@@ -16,8 +16,8 @@ use mrol_map::map::RobotName;
 use mrol_map::mapping::Guess;
 use mrol_map::planning::{BandFrom, GridArea, Surroundings, Unknown};
 use mrol_service::{
-    Asked, CheckAs, ClassifyQuestion, GridQuestion, GridScope, LocalizationRequest, MotionCheck, PointCloud,
-    PoseCheck, RayQuestion, RaysToward, ScanRequest,
+    CheckAs, ClassifyQuestion, GridQuestion, GridScope, LocalizationRequest, MotionCheck, PointCloud,
+    PoseCheck, QuestionScope, RayQuestion, RaysToward, ScanRequest,
 };
 
 /// Poses of a check, a controller's cycle.
@@ -69,7 +69,7 @@ impl Made {
             [MOTIONS, POINTS, RAYS, GARBAGE_POINTS, TINY_POINTS].map(&mut somewhere);
         let poses = somewhere(POSES).into_iter().flat_map(pose).collect();
         let motions = from.into_iter().flat_map(|from| [pose(from), pose(moved(from))]).flatten().collect();
-        let asked = Asked::default();
+        let asked = QuestionScope::default();
         let surroundings = || Surroundings::ALL_VOXELS;
         Ok(Self {
             poses: PoseCheck {

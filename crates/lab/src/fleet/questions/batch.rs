@@ -5,7 +5,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use mrol_client::{Answers, Client, ClientError};
 use mrol_map::map::MapName;
 use mrol_map::planning::NUMBERS_PER_POSE;
-use mrol_service::{Answered, MotionCheck, PoseCheck, Question, RayQuestion, RaysToward};
+use mrol_service::{AtVersion, MotionCheck, PoseCheck, Question, RayQuestion, RaysToward};
 
 /// A question about many things.
 pub(crate) trait Batch: Question + Clone {
@@ -13,14 +13,14 @@ pub(crate) trait Batch: Question + Clone {
     fn items(&self) -> usize;
 
     /// Asks it by itself.
-    async fn ask(self, client: &Client, map: &MapName) -> Result<Answered<Self::Answer>, ClientError>;
+    async fn ask(self, client: &Client, map: &MapName) -> Result<AtVersion<Self::Answer>, ClientError>;
 
     /// Asks one after the other on a stream.
     async fn stream(
         client: &Client,
         map: &MapName,
         batches: ReceiverStream<Self>,
-    ) -> Result<Answers<Answered<Self::Answer>>, ClientError>;
+    ) -> Result<Answers<AtVersion<Self::Answer>>, ClientError>;
 }
 
 impl Batch for PoseCheck {
@@ -28,7 +28,7 @@ impl Batch for PoseCheck {
         self.configurations.len() / (NUMBERS_PER_POSE * self.body.links().len())
     }
 
-    async fn ask(self, client: &Client, map: &MapName) -> Result<Answered<Self::Answer>, ClientError> {
+    async fn ask(self, client: &Client, map: &MapName) -> Result<AtVersion<Self::Answer>, ClientError> {
         client.check_poses(map, self).await
     }
 
@@ -36,7 +36,7 @@ impl Batch for PoseCheck {
         client: &Client,
         map: &MapName,
         batches: ReceiverStream<Self>,
-    ) -> Result<Answers<Answered<Self::Answer>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Self::Answer>>, ClientError> {
         client.pose_stream(map, batches).await
     }
 }
@@ -46,7 +46,7 @@ impl Batch for MotionCheck {
         self.lengths.len()
     }
 
-    async fn ask(self, client: &Client, map: &MapName) -> Result<Answered<Self::Answer>, ClientError> {
+    async fn ask(self, client: &Client, map: &MapName) -> Result<AtVersion<Self::Answer>, ClientError> {
         client.check_motions(map, self).await
     }
 
@@ -54,7 +54,7 @@ impl Batch for MotionCheck {
         client: &Client,
         map: &MapName,
         batches: ReceiverStream<Self>,
-    ) -> Result<Answers<Answered<Self::Answer>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Self::Answer>>, ClientError> {
         client.motion_stream(map, batches).await
     }
 }
@@ -67,7 +67,7 @@ impl Batch for RayQuestion {
         }
     }
 
-    async fn ask(self, client: &Client, map: &MapName) -> Result<Answered<Self::Answer>, ClientError> {
+    async fn ask(self, client: &Client, map: &MapName) -> Result<AtVersion<Self::Answer>, ClientError> {
         client.cast_rays(map, self).await
     }
 
@@ -75,7 +75,7 @@ impl Batch for RayQuestion {
         client: &Client,
         map: &MapName,
         batches: ReceiverStream<Self>,
-    ) -> Result<Answers<Answered<Self::Answer>>, ClientError> {
+    ) -> Result<Answers<AtVersion<Self::Answer>>, ClientError> {
         client.ray_stream(map, batches).await
     }
 }

@@ -14,7 +14,7 @@ use crate::workload::bodies::cart;
 use crate::workload::bodies::place::Surface;
 use mrol_map::map::MultiResolutionMap;
 use mrol_map::planning::{Body, NUMBERS_PER_POSE, Planner, Surroundings, Unknown};
-use mrol_service::{Asked, CheckAs, MotionCheck, PointCloud, PoseCheck, RayQuestion, RaysToward};
+use mrol_service::{CheckAs, MotionCheck, PointCloud, PoseCheck, QuestionScope, RayQuestion, RaysToward};
 
 /// Messages that are asked in turn.
 const MESSAGES: usize = 16;
@@ -79,7 +79,7 @@ impl Questions {
         let made = half_colliding(&self.planner, &body, &self.surface, &mut self.random);
         let (configurations, _) = made.map_err(FleetError::failed)?;
         Ok(MotionCheck {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             lengths: vec![2; configurations.len() / (2 * NUMBERS_PER_POSE)],
             configurations,
             body: Arc::new(body),
@@ -99,7 +99,7 @@ impl Questions {
 
 fn check(body: &Arc<Body>, configurations: Vec<f32>) -> PoseCheck {
     PoseCheck {
-        asked: Asked::default(),
+        asked: QuestionScope::default(),
         body: Arc::clone(body),
         configurations,
         surroundings: Surroundings::ALL_VOXELS,
@@ -113,7 +113,7 @@ pub(crate) fn rays(shots: &Shots, range_m: f64) -> Vec<RayQuestion> {
     let message = |(origins, directions): (&[_], &[_])| {
         let has_one = origins.iter().all(|origin| *origin == origins[0]);
         RayQuestion {
-            asked: Asked::default(),
+            asked: QuestionScope::default(),
             origins: PointCloud::from(if has_one { origins[..1].to_vec() } else { origins.to_vec() }),
             toward: RaysToward::Directions { directions: PointCloud::from(directions.to_vec()), range_m },
             unknown: Unknown::Free,

@@ -6,7 +6,7 @@ use crate::request::MapVersion;
 
 /// What all questions have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Asked {
+pub struct QuestionScope {
     /// The level of the voxels, 0 the finest.
     pub level: u32,
     /// Wait for this revision.
@@ -19,7 +19,7 @@ pub struct Asked {
 
 /// The answer to a question, with the state of the map that it is of.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answered<A> {
+pub struct AtVersion<A> {
     /// The answer.
     pub answer: A,
     /// All of it is at this state; an answer that took long and let others go first is at this one or at later ones.

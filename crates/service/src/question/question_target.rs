@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use super::asked::Asked;
 use super::pieces::WholeView;
+use super::scope::QuestionScope;
 use crate::error::ServiceError;
 use crate::limits::Limits;
 use crate::work::{TimeLimit, check_not_stopped, ended_early};
@@ -17,14 +17,14 @@ const SHORT_ELEMENTS: usize = 4096;
 
 /// A map that questions are asked of, and the planner of it, which is made when it is first needed.
 #[derive(Debug, Clone, Copy)]
-pub struct QuestionedMap<'a> {
+pub struct QuestionTarget<'a> {
     map: &'a Arc<MultiResolutionMap>,
     planner: &'a OnceLock<Planner>,
     field_bytes_max: usize,
     may_wait: bool,
 }
 
-impl<'a> QuestionedMap<'a> {
+impl<'a> QuestionTarget<'a> {
     /// The map, with a place for its planner, whose fields hold at most so many bytes.
     pub fn new(
         map: &'a Arc<MultiResolutionMap>,
@@ -50,7 +50,7 @@ impl<'a> QuestionedMap<'a> {
     /// How the question was stopped: also where the view has to be waited for and must not be.
     pub(super) fn planning_view(
         &self,
-        asked: &Asked,
+        asked: &QuestionScope,
         surroundings: &Surroundings,
         stop: StopSignal<'_>,
     ) -> Result<PlanningView<'a>, ServiceError> {
@@ -72,7 +72,7 @@ impl<'a> QuestionedMap<'a> {
     }
 
     /// A view of the whole map; none where it has to be waited for and must not be.
-    fn view(&self, asked: &Asked) -> Option<MapView<'a>> {
+    fn view(&self, asked: &QuestionScope) -> Option<MapView<'a>> {
         match (self.may_wait, asked.ignore_keep_outs) {
             (true, true) => Some(self.map.view().with_viewpoints()),
             (true, false) => Some(self.map.view().with_keep_outs().with_viewpoints()),
@@ -88,7 +88,7 @@ impl<'a> QuestionedMap<'a> {
     /// How the question was stopped: also where the view has to be waited for and must not be.
     pub(super) fn whole_view(
         &self,
-        asked: &Asked,
+        asked: &QuestionScope,
         elements: usize,
         stop: StopSignal<'_>,
     ) -> Result<WholeView<'a>, ServiceError> {
@@ -99,7 +99,7 @@ impl<'a> QuestionedMap<'a> {
     }
 
     /// A view of the whole map for a question that takes long, which lets others go first between its parts.
-    pub(super) fn pausing_view(&self, asked: &Asked) -> PausingView<'a> {
+    pub(super) fn pausing_view(&self, asked: &QuestionScope) -> PausingView<'a> {
         PausingView::during(self.map.long_read(), !asked.ignore_keep_outs, true)
     }
 
@@ -108,7 +108,7 @@ impl<'a> QuestionedMap<'a> {
     /// this one.
     pub(super) fn in_view<A>(
         &self,
-        asked: &Asked,
+        asked: &QuestionScope,
         elements: usize,
         stop: StopSignal<'_>,
         f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
@@ -124,7 +124,7 @@ impl<'a> QuestionedMap<'a> {
     /// first.
     pub(super) fn in_parts<A>(
         &self,
-        asked: &Asked,
+        asked: &QuestionScope,
         (elements, of_part): (usize, usize),
         limits: &Limits,
         stop: StopSignal<'_>,

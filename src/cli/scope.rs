@@ -1,10 +1,10 @@
 //! What planners' questions have in common.
 
-use mrol_service::Asked;
+use mrol_service::QuestionScope;
 
 /// Options of every question.
 #[derive(Debug, clap::Args)]
-pub(super) struct AskedOptions {
+pub(super) struct ScopeOptions {
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
@@ -16,9 +16,9 @@ pub(super) struct AskedOptions {
     ignore_keep_outs: bool,
 }
 
-impl AskedOptions {
-    pub(super) fn asked(&self) -> Asked {
+impl ScopeOptions {
+    pub(super) fn scope(&self) -> QuestionScope {
         let Self { level, min_revision, ignore_keep_outs } = *self;
-        Asked { level, min_revision, map_uuid: None, ignore_keep_outs }
+        QuestionScope { level, min_revision, map_uuid: None, ignore_keep_outs }
     }
 }
