@@ -8,6 +8,7 @@ mod object;
 mod octets;
 pub(super) mod params;
 mod shapes;
+mod two_forms;
 mod unreadable;
 
 pub(super) use body::points_of;
@@ -26,3 +27,4 @@ pub(super) use params::{
     numbers, request_id_of,
 };
 pub(super) use shapes::{BoxBody, OrientedBoxBody, PrismBody, SphereBody};
+pub(super) use two_forms::two_forms;

@@ -1,8 +1,8 @@
 //! `POST /v1/maps/{map}/deletions`: take voxels out.
 
 use axum::response::Json;
-use serde::{Deserialize, Serialize};
-use utoipa::{IntoParams, ToSchema};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::http::error::HttpError;
 use crate::http::forms::JsonPoints;
@@ -10,54 +10,46 @@ use crate::http::forms::Object;
 use crate::http::forms::PointBytes;
 use crate::http::forms::{BoxBody, OrientedBoxBody, SphereBody};
 use crate::http::forms::{Map, request_id_of};
-use crate::http::forms::{Points, points_of};
+use crate::http::forms::{Points, points_of, two_forms};
 use crate::http::middleware::Service;
 use crate::json::described;
 use crate::json::{JsonVersion, VoxelIndex};
 use mrol_map::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
 use mrol_service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 
-/// What is deleted: exactly one target.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({"sphere": {"center_m": [50, 50, 50], "radius_m": 0.1}}))]
-pub(crate) struct DeletionBody {
-    /// The voxels of these points.
-    #[schema(value_type = Option<JsonPoints>)]
-    points: Option<JsonPoints>,
-    /// Voxels of the level by their indices.
-    #[schema(value_type = Option<Vec<VoxelIndex>>)]
-    voxels: Option<Vec<[i32; 3]>>,
-    /// The voxels whose centers lie in a box along the map's axes.
-    #[schema(value_type = Option<BoxBody>)]
-    r#box: Option<Object<BoxBody>>,
-    /// The voxels whose centers lie in a ball.
-    #[schema(value_type = Option<SphereBody>)]
-    sphere: Option<Object<SphereBody>>,
-    /// The voxels whose centers lie in a box with any orientation.
-    #[schema(value_type = Option<OrientedBoxBody>)]
-    oriented_box: Option<Object<OrientedBoxBody>>,
-    /// The level whose voxels are meant, 0 the finest; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// The caller's own id of this change: sent again, it changes nothing.
-    #[schema(value_type = Option<described::RequestId>)]
-    request_id: Option<String>,
-    /// Of a region, only what no scan after this revision touched although one saw well beyond.
-    not_seen_since: Option<u64>,
-}
+two_forms! {
+    /// What is deleted: exactly one target.
+    #[schema(example = json!({"sphere": {"center_m": [50, 50, 50], "radius_m": 0.1}}))]
+    body DeletionBody {
+        /// The voxels of these points.
+        #[schema(value_type = Option<JsonPoints>)]
+        points: Option<JsonPoints>,
+        /// Voxels of the level by their indices.
+        #[schema(value_type = Option<Vec<VoxelIndex>>)]
+        voxels: Option<Vec<[i32; 3]>>,
+        /// The voxels whose centers lie in a box along the map's axes.
+        #[schema(value_type = Option<BoxBody>)]
+        r#box: Option<Object<BoxBody>>,
+        /// The voxels whose centers lie in a ball.
+        #[schema(value_type = Option<SphereBody>)]
+        sphere: Option<Object<SphereBody>>,
+        /// The voxels whose centers lie in a box with any orientation.
+        #[schema(value_type = Option<OrientedBoxBody>)]
+        oriented_box: Option<Object<OrientedBoxBody>>,
+        /// Of a region, only what no scan after this revision touched although one saw well beyond.
+        not_seen_since: Option<u64>,
+    }
 
-/// With points as bytes: what else there is to a deletion.
-#[derive(Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct DeletionParams {
-    /// The level whose voxels are meant; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// The caller's own id of this change.
-    #[param(value_type = Option<described::RequestId>, inline)]
-    request_id: Option<String>,
+    /// With points as bytes: what else there is to a deletion.
+    params DeletionParams {}
+
+    both {
+        /// The level whose voxels are meant, 0 the finest; 0 without.
+        #[serde(default)]
+        level: u32,
+        /// The caller's own id of this change: sent again, it changes nothing.
+        request_id: Option<String> as Option<described::RequestId>,
+    }
 }
 
 type DeletionPoints = Points<DeletionBody, DeletionParams>;

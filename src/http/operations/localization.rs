@@ -2,40 +2,56 @@
 
 use axum::response::Json;
 use serde::Deserialize;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 
 use crate::http::error::HttpError;
 use crate::http::forms::JsonPoints;
 use crate::http::forms::Object;
 use crate::http::forms::PointBytes;
 use crate::http::forms::{Map, Numbers3, Numbers6, params};
-use crate::http::forms::{Points, points_of};
+use crate::http::forms::{Points, points_of, two_forms};
 use crate::http::middleware::Service;
 use crate::json::{JsonLocalization, Vector3};
 use mrol_map::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use mrol_service::{LocalizationRequest, PointCloud, Reason, ServiceError};
 
-/// A scan, and what is known of where it was taken.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({"points": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "gravity": {"in_sensor": [0, 0, -1]}}))]
-pub(crate) struct LocalizationBody {
-    /// The scan, in the sensor frame.
-    points: JsonPoints,
-    /// The direction in which things fall: makes the search about ten times as fast, and exhaustive.
-    #[schema(value_type = Option<GravityBody>)]
-    gravity: Option<Object<GravityBody>>,
-    /// Where the scan may have been taken; the bulk of the map and around its trajectory without.
-    #[schema(value_type = Option<SearchBoxBody>)]
-    search_box: Option<Object<SearchBoxBody>>,
-    /// Seconds that the search may take, at most `limits.localization_time_max_s`.
-    time_limit_s: Option<f64>,
-    /// Places in the answer, at most `limits.localization_candidates_max`; 5 without.
-    #[serde(default)]
-    candidates: u32,
-    /// Seed of the sampling: the same one gives the same answer; 0 without.
-    #[serde(default)]
-    seed: u64,
+two_forms! {
+    /// A scan, and what is known of where it was taken.
+    #[schema(example = json!({"points": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "gravity": {"in_sensor": [0, 0, -1]}}))]
+    body LocalizationBody {
+        /// The scan, in the sensor frame.
+        points: JsonPoints,
+        /// The direction in which things fall: makes the search about ten times as fast, and exhaustive.
+        #[schema(value_type = Option<GravityBody>)]
+        gravity: Option<Object<GravityBody>>,
+        /// Where the scan may have been taken; the bulk of the map and around its trajectory without.
+        #[schema(value_type = Option<SearchBoxBody>)]
+        search_box: Option<Object<SearchBoxBody>>,
+    }
+
+    /// The parameters of a localization beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
+    params LocalizationParams {
+        /// The direction in which things fall, `x,y,z` in the sensor frame.
+        #[param(value_type = Option<Numbers3>, inline)]
+        gravity: Option<String>,
+        /// The same in the map frame; `0,0,-1` without.
+        #[param(value_type = Option<Numbers3>, inline)]
+        map_gravity: Option<String>,
+        /// Where the scan may have been taken: the smallest and the largest coordinates, `x,y,z,x,y,z`.
+        #[param(value_type = Option<Numbers6>, inline)]
+        search_box: Option<String>,
+    }
+
+    both {
+        /// Seconds that the search may take, at most `limits.localization_time_max_s`.
+        time_limit_s: Option<f64>,
+        /// Places in the answer, at most `limits.localization_candidates_max`; 5 without.
+        #[serde(default)]
+        candidates: u32,
+        /// Seed of the sampling: the same one gives the same answer; 0 without.
+        #[serde(default)]
+        seed: u64,
+    }
 }
 
 /// The direction in which things fall.
@@ -60,30 +76,6 @@ struct SearchBoxBody {
     /// Largest coordinates.
     #[schema(value_type = Vector3)]
     max_m: [f64; 3],
-}
-
-/// The parameters of a localization beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
-#[derive(Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct LocalizationParams {
-    /// The direction in which things fall, `x,y,z` in the sensor frame.
-    #[param(value_type = Option<Numbers3>, inline)]
-    gravity: Option<String>,
-    /// The same in the map frame; `0,0,-1` without.
-    #[param(value_type = Option<Numbers3>, inline)]
-    map_gravity: Option<String>,
-    /// Where the scan may have been taken: the smallest and the largest coordinates, `x,y,z,x,y,z`.
-    #[param(value_type = Option<Numbers6>, inline)]
-    search_box: Option<String>,
-    /// Seconds that the search may take, at most `limits.localization_time_max_s`.
-    time_limit_s: Option<f64>,
-    /// Places in the answer, at most `limits.localization_candidates_max`; 5 without.
-    #[serde(default)]
-    candidates: u32,
-    /// Seed of the sampling: the same one gives the same answer; 0 without.
-    #[serde(default)]
-    seed: u64,
 }
 
 type LocalizationPoints = Points<LocalizationBody, LocalizationParams>;

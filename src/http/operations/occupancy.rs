@@ -2,15 +2,15 @@
 
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
-use serde::{Deserialize, Serialize};
-use utoipa::{IntoParams, ToSchema};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::http::error::HttpError;
 use crate::http::forms::JsonPoints;
 use crate::http::forms::Object;
 use crate::http::forms::{BitmapBytes, PointBytes};
 use crate::http::forms::{Map, Numbers7, params};
-use crate::http::forms::{Points, points_of};
+use crate::http::forms::{Points, points_of, two_forms};
 use crate::http::headers;
 use crate::http::middleware::Service;
 use crate::http::pieces;
@@ -21,56 +21,43 @@ use mrol_map::geometry::Pose;
 use mrol_map::map::Lookup;
 use mrol_service::{PointAnswer, PointCloud, PointQuery, ServiceError};
 
-/// Points, and where they are.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({"points": [[0, 0, 0], [1, 1, 0.5]]}))]
-pub(crate) struct QueryBody {
-    /// The points.
-    points: JsonPoints,
-    /// What places the points in the map; the identity without.
-    #[schema(value_type = Option<JsonPose>)]
-    map_from_points: Option<Object<JsonPose>>,
-    /// The level, 0 the finest; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// What is asked: the exact set, or the Bloom filter; `exact` without.
-    #[schema(value_type = described::Lookup, required = false)]
-    #[serde(default)]
-    lookup: ByKeyword<Lookup>,
-    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
-    min_revision: Option<u64>,
-    /// The map that the answer must speak of: another one is refused (`map_replaced`).
-    #[schema(format = "uuid")]
-    map_uuid: Option<String>,
-    /// Whether points in keep-outs count as occupied; false without.
-    #[serde(default)]
-    keep_out: bool,
-}
+two_forms! {
+    /// Points, and where they are.
+    #[schema(example = json!({"points": [[0, 0, 0], [1, 1, 0.5]]}))]
+    body QueryBody {
+        /// The points.
+        points: JsonPoints,
+        /// What places the points in the map; the identity without.
+        #[schema(value_type = Option<JsonPose>)]
+        map_from_points: Option<Object<JsonPose>>,
+        /// The map that the answer must speak of: another one is refused (`map_replaced`).
+        #[schema(format = "uuid")]
+        map_uuid: Option<String>,
+    }
 
-/// With points as bytes: where they are.
-#[derive(Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct QueryParams {
-    /// What places the points in the map, `x,y,z,qx,qy,qz,qw`; the identity without.
-    #[param(value_type = Option<Numbers7>, inline)]
-    pose: Option<String>,
-    /// The level, 0 the finest; 0 without.
-    #[serde(default)]
-    level: u32,
-    /// What is asked: the exact set, or the Bloom filter; `exact` without.
-    #[param(value_type = described::Lookup, inline, required = false)]
-    #[serde(default)]
-    lookup: ByKeyword<Lookup>,
-    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
-    min_revision: Option<u64>,
-    /// The map that the answer must speak of: another one is refused (`map_replaced`).
-    #[param(format = "uuid")]
-    map_uuid: Option<String>,
-    /// Whether points in keep-outs count as occupied; false without.
-    #[serde(default)]
-    keep_out: bool,
+    /// With points as bytes: where they are.
+    params QueryParams {
+        /// What places the points in the map, `x,y,z,qx,qy,qz,qw`; the identity without.
+        #[param(value_type = Option<Numbers7>, inline)]
+        pose: Option<String>,
+        /// The map that the answer must speak of: another one is refused (`map_replaced`).
+        #[param(format = "uuid")]
+        map_uuid: Option<String>,
+    }
+
+    both {
+        /// The level, 0 the finest; 0 without.
+        #[serde(default)]
+        level: u32,
+        /// What is asked: the exact set, or the Bloom filter; `exact` without.
+        #[serde(default)]
+        lookup: ByKeyword<Lookup> as described::Lookup where required = false,
+        /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
+        min_revision: Option<u64>,
+        /// Whether points in keep-outs count as occupied; false without.
+        #[serde(default)]
+        keep_out: bool,
+    }
 }
 
 /// Which points are in occupied voxels.

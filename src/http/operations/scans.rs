@@ -2,8 +2,6 @@
 
 use axum::body::Bytes;
 use axum::response::Json;
-use serde::Deserialize;
-use utoipa::{IntoParams, ToSchema};
 
 use crate::http::error::HttpError;
 use crate::http::forms::JsonPoints;
@@ -11,7 +9,7 @@ use crate::http::forms::List;
 use crate::http::forms::Object;
 use crate::http::forms::ScanBytes;
 use crate::http::forms::{Map, Numbers3, Numbers6, Numbers7, Numbers36, params};
-use crate::http::forms::{Points, points_of};
+use crate::http::forms::{Points, points_of, two_forms};
 use crate::http::middleware::Service;
 use crate::json::described;
 use crate::json::{ByKeyword, Corners3, JsonPose, JsonScan, Vector3};
@@ -27,155 +25,105 @@ use mrol_service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference}
 /// Numbers of a covariance of a pose.
 const COVARIANCE_NUMBERS: usize = 36;
 
-/// A scan, and where it is thought to have been taken.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(example = json!({
-    "robot": "example", "scan_id": 1, "points": [[1, 1, 0.5], [1, 1.05, 0.5]], "align": false,
-    "guess": {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]}
-}))]
-pub(crate) struct ScanBody {
-    /// The robot that sends it.
-    #[schema(value_type = described::RobotName)]
-    robot: String,
-    /// The run of the robot's program; empty without.
-    #[schema(value_type = described::SessionName, required = false)]
-    #[serde(default)]
-    session: String,
-    /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
-    /// nothing.
-    scan_id: Option<u64>,
-    /// The points, in the sensor frame.
-    points: JsonPoints,
-    /// When it was taken, nanoseconds since the Unix epoch.
-    timestamp_ns: Option<i64>,
-    /// Seconds from `timestamp_ns`, one for each point, of a sensor that moves during its sweep.
-    point_times: Option<Vec<f32>>,
-    /// Whether the times count from the beginning of the sweep, and `timestamp_ns` is its end; false without.
-    #[serde(default)]
-    point_times_from_sweep_start: bool,
-    /// Where the scan is thought to have been taken, `map_from_sensor`; the robot's last accepted pose
-    /// without.
-    #[schema(value_type = Option<JsonPose>)]
-    guess: Option<Object<JsonPose>>,
-    /// In the place of a guess: how far it is from the last accepted pose, `last_from_sensor`.
-    #[schema(value_type = Option<JsonPose>)]
-    motion: Option<Object<JsonPose>>,
-    /// In the place of a guess: as far from the last accepted pose as that is from the one before; false
-    /// without.
-    #[serde(default)]
-    constant_velocity: bool,
-    /// How far off the guess may be: 6 x 6 numbers, row by row, x y z in meters and then turns about the
-    /// map's axes in radians.
-    #[schema(value_type = Option<Vec<f64>>, min_items = 36, max_items = 36)]
-    guess_covariance: Option<List<f64, COVARIANCE_NUMBERS>>,
-    /// The direction in which things fall, in the sensor frame; any length.
-    #[schema(value_type = Option<Vector3>)]
-    gravity_in_sensor: Option<[f64; 3]>,
-    /// Whether the scan is aligned; true without. False adds it at its guess.
-    #[serde(default = "yes")]
-    align: bool,
-    /// Whether it is added whatever its verdict; false without.
-    #[serde(default)]
-    force: bool,
-    /// Whether the robot is looked for where the scan is refused; the robot's setting without. For `/scans`
-    /// alone.
-    recover: Option<bool>,
-    /// Whether what the scan saw through is taken out of the map; the robot's setting without. For `/scans`
-    /// alone.
-    carve: Option<bool>,
-    /// How it is aligned; the server's setting without.
-    #[schema(value_type = Option<described::Method>)]
-    method: Option<ByKeyword<Method>>,
-    /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
-    foreground_level: Option<u32>,
-    /// Nearer points are skipped, meters; the robot's setting without.
-    range_min_m: Option<f64>,
-    /// Farther points are skipped, meters; the robot's setting without.
-    range_max_m: Option<f64>,
-    /// Points in this box are of the robot itself, and skipped: its smallest and its largest coordinates,
-    /// meters, in the sensor frame.
-    #[schema(value_type = Option<Corners3>)]
-    body_m: Option<[[f64; 3]; 2]>,
-    /// How the rays of its sensor lie: `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
-    /// FY`; the robot's setting without.
-    sensor: Option<String>,
-    /// Whether points that are not finite are an error; false without: they are skipped.
-    #[serde(default)]
-    strict: bool,
-}
+two_forms! {
+    /// A scan, and where it is thought to have been taken.
+    #[schema(example = json!({
+        "robot": "example", "scan_id": 1, "points": [[1, 1, 0.5], [1, 1.05, 0.5]], "align": false,
+        "guess": {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]}
+    }))]
+    body ScanBody {
+        /// The points, in the sensor frame.
+        points: JsonPoints,
+        /// Seconds from `timestamp_ns`, one for each point, of a sensor that moves during its sweep.
+        point_times: Option<Vec<f32>>,
+        /// Where the scan is thought to have been taken, `map_from_sensor`; the robot's last accepted pose
+        /// without.
+        #[schema(value_type = Option<JsonPose>)]
+        guess: Option<Object<JsonPose>>,
+        /// In the place of a guess: how far it is from the last accepted pose, `last_from_sensor`.
+        #[schema(value_type = Option<JsonPose>)]
+        motion: Option<Object<JsonPose>>,
+        /// How far off the guess may be: 6 x 6 numbers, row by row, x y z in meters and then turns about the
+        /// map's axes in radians.
+        #[schema(value_type = Option<Vec<f64>>, min_items = 36, max_items = 36)]
+        guess_covariance: Option<List<f64, COVARIANCE_NUMBERS>>,
+        /// The direction in which things fall, in the sensor frame; any length.
+        #[schema(value_type = Option<Vector3>)]
+        gravity_in_sensor: Option<[f64; 3]>,
+        /// Points in this box are of the robot itself, and skipped: its smallest and its largest coordinates,
+        /// meters, in the sensor frame.
+        #[schema(value_type = Option<Corners3>)]
+        body_m: Option<[[f64; 3]; 2]>,
+    }
 
-/// With points as bytes: what else there is to a scan.
-#[derive(Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct ScanParams {
-    /// The robot that sends it.
-    #[param(value_type = described::RobotName, inline)]
-    robot: String,
-    /// The run of the robot's program; empty without.
-    #[param(value_type = described::SessionName, inline, required = false)]
-    #[serde(default)]
-    session: String,
-    /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
-    /// nothing.
-    scan_id: Option<u64>,
-    /// When it was taken, nanoseconds since the Unix epoch.
-    timestamp_ns: Option<i64>,
-    /// Whether times come behind the points; false without.
-    #[serde(default)]
-    point_times: bool,
-    /// Whether the times count from the beginning of the sweep, and `timestamp_ns` is its end; false without.
-    #[serde(default)]
-    point_times_from_sweep_start: bool,
-    /// Where the scan is thought to have been taken, `x,y,z,qx,qy,qz,qw`; the robot's last accepted pose
-    /// without.
-    #[param(value_type = Option<Numbers7>, inline)]
-    guess: Option<String>,
-    /// In the place of a guess: how far it is from the last accepted pose, `x,y,z,qx,qy,qz,qw`.
-    #[param(value_type = Option<Numbers7>, inline)]
-    motion: Option<String>,
-    /// In the place of a guess: as far from the last accepted pose as that is from the one before; false
-    /// without.
-    #[serde(default)]
-    constant_velocity: bool,
-    /// How far off the guess may be: 36 numbers, row by row.
-    #[param(value_type = Option<Numbers36>, inline)]
-    guess_covariance: Option<String>,
-    /// The direction in which things fall, `x,y,z` in the sensor frame; any length.
-    #[param(value_type = Option<Numbers3>, inline)]
-    gravity_in_sensor: Option<String>,
-    /// Whether the scan is aligned; true without. False adds it at its guess.
-    #[param(required = false)]
-    #[serde(default = "yes")]
-    align: bool,
-    /// Whether it is added whatever its verdict; false without.
-    #[serde(default)]
-    force: bool,
-    /// Whether the robot is looked for where the scan is refused; the robot's setting without. For `/scans`
-    /// alone.
-    recover: Option<bool>,
-    /// Whether what the scan saw through is taken out of the map; the robot's setting without. For `/scans`
-    /// alone.
-    carve: Option<bool>,
-    /// How it is aligned; the server's setting without.
-    #[param(value_type = Option<described::Method>, inline)]
-    method: Option<ByKeyword<Method>>,
-    /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
-    foreground_level: Option<u32>,
-    /// Nearer points are skipped, meters; the robot's setting without.
-    range_min_m: Option<f64>,
-    /// Farther points are skipped, meters; the robot's setting without.
-    range_max_m: Option<f64>,
-    /// Points in this box are of the robot itself, and skipped: `x,y,z,x,y,z`, meters, in the sensor frame.
-    #[param(value_type = Option<Numbers6>, inline)]
-    body_m: Option<String>,
-    /// How the rays of its sensor lie: `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
-    /// FY`; the robot's setting without.
-    sensor: Option<String>,
-    /// Whether points that are not finite are an error; false without: they are skipped.
-    #[serde(default)]
-    strict: bool,
+    /// With points as bytes: what else there is to a scan.
+    params ScanParams {
+        /// Whether times come behind the points; false without.
+        #[serde(default)]
+        point_times: bool,
+        /// Where the scan is thought to have been taken, `x,y,z,qx,qy,qz,qw`; the robot's last accepted pose
+        /// without.
+        #[param(value_type = Option<Numbers7>, inline)]
+        guess: Option<String>,
+        /// In the place of a guess: how far it is from the last accepted pose, `x,y,z,qx,qy,qz,qw`.
+        #[param(value_type = Option<Numbers7>, inline)]
+        motion: Option<String>,
+        /// How far off the guess may be: 36 numbers, row by row.
+        #[param(value_type = Option<Numbers36>, inline)]
+        guess_covariance: Option<String>,
+        /// The direction in which things fall, `x,y,z` in the sensor frame; any length.
+        #[param(value_type = Option<Numbers3>, inline)]
+        gravity_in_sensor: Option<String>,
+        /// Points in this box are of the robot itself, and skipped: `x,y,z,x,y,z`, meters, in the sensor frame.
+        #[param(value_type = Option<Numbers6>, inline)]
+        body_m: Option<String>,
+    }
+
+    both {
+        /// The robot that sends it.
+        robot: String as described::RobotName,
+        /// The run of the robot's program; empty without.
+        #[serde(default)]
+        session: String as described::SessionName where required = false,
+        /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
+        /// nothing.
+        scan_id: Option<u64>,
+        /// When it was taken, nanoseconds since the Unix epoch.
+        timestamp_ns: Option<i64>,
+        /// Whether the times count from the beginning of the sweep, and `timestamp_ns` is its end; false without.
+        #[serde(default)]
+        point_times_from_sweep_start: bool,
+        /// In the place of a guess: as far from the last accepted pose as that is from the one before; false
+        /// without.
+        #[serde(default)]
+        constant_velocity: bool,
+        /// Whether the scan is aligned; true without. False adds it at its guess.
+        #[serde(default = "yes")]
+        align: bool where required = false,
+        /// Whether it is added whatever its verdict; false without.
+        #[serde(default)]
+        force: bool,
+        /// Whether the robot is looked for where the scan is refused; the robot's setting without. For `/scans`
+        /// alone.
+        recover: Option<bool>,
+        /// Whether what the scan saw through is taken out of the map; the robot's setting without. For `/scans`
+        /// alone.
+        carve: Option<bool>,
+        /// How it is aligned; the server's setting without.
+        method: Option<ByKeyword<Method>> as Option<described::Method>,
+        /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
+        foreground_level: Option<u32>,
+        /// Nearer points are skipped, meters; the robot's setting without.
+        range_min_m: Option<f64>,
+        /// Farther points are skipped, meters; the robot's setting without.
+        range_max_m: Option<f64>,
+        /// How the rays of its sensor lie: `spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG` or `pinhole WIDTH HEIGHT FX
+        /// FY`; the robot's setting without.
+        sensor: Option<String>,
+        /// Whether points that are not finite are an error; false without: they are skipped.
+        #[serde(default)]
+        strict: bool,
+    }
 }
 
 type ScanPoints = Points<ScanBody, ScanParams>;

@@ -191,3 +191,33 @@ pub(super) fn collisions_answered(collisions: Collisions) -> (CheckedHead, Array
     }
     (CheckedHead { checked, colliding_count }, arrays)
 }
+
+/// Declares the body of a check: the fields that are given, and after them those that all checks have, and all questions
+/// (see [`question_body`](super::scope::question_body)).
+macro_rules! check_body {
+    ($(#[$attribute:meta])* $visibility:vis struct $Body:ident { $($own:tt)* }) => {
+        $crate::http::question::scope::question_body! {
+            $(#[$attribute])*
+            $visibility struct $Body {
+                $($own)*
+                /// Regions in which voxels do not count; 64 at most.
+                #[schema(value_type = Vec<$crate::http::question::body::DescribedIgnored>, required = false)]
+                #[serde(default)]
+                ignored: $crate::http::question::body::IgnoredList,
+                /// What voxels are that no scan saw through: free or occupied; `free` without.
+                #[schema(value_type = $crate::json::described::Unknown, required = false)]
+                #[serde(default)]
+                unknown: $crate::json::ByKeyword<mrol_map::planning::Unknown>,
+                /// What is told: whether there is a collision, the first one, or how far away the nearest voxel is;
+                /// `colliding` without.
+                #[schema(value_type = $crate::http::question::body::AnswerWord, required = false)]
+                #[serde(default)]
+                answer: $crate::json::ByKeyword<$crate::http::question::body::AnswerWord>,
+                /// How far clearances are told, meters.
+                clearance_max_m: Option<f32>,
+            }
+        }
+    };
+}
+
+pub(super) use check_body;

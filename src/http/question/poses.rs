@@ -3,19 +3,15 @@
 use axum::body::Bytes;
 
 use super::answer::Arrays;
-use super::body::{AnswerWord, BodyField, DescribedIgnored, IgnoredList, collisions_answered, ignored_of};
-use super::body::{CheckedHead, CheckedResponse};
+use super::body::{BodyField, CheckedHead, CheckedResponse, check_body, collisions_answered, ignored_of};
 use super::form::NumbersField;
 use super::handler::{AnswerOf, HttpQuestion, question_handler};
-use super::scope::question_body;
 use crate::http::forms::Object;
-use crate::json::described;
-use crate::json::{ByKeyword, PoseNumbers};
+use crate::json::PoseNumbers;
 use mrol_client::wire::pb;
-use mrol_map::planning::Unknown;
 use mrol_service::{PoseCheck, ServiceError};
 
-question_body! {
+check_body! {
     /// A body and its configurations.
     #[schema(example = json!({
         "body": {"links": [{"spheres": [[0, 0, 0, 0.2]]}]}, "configurations": [[0, 0, 1, 0, 0, 0, 1]]
@@ -27,21 +23,6 @@ question_body! {
         /// A pose `[x, y, z, qx, qy, qz, qw]` for each link, link by link, configuration by configuration.
         #[schema(value_type = Vec<PoseNumbers>)]
         configurations: NumbersField<7>,
-        /// Regions in which voxels do not count; 64 at most.
-        #[schema(value_type = Vec<DescribedIgnored>, required = false)]
-        #[serde(default)]
-        ignored: IgnoredList,
-        /// What voxels are that no scan saw through: free or occupied; `free` without.
-        #[schema(value_type = described::Unknown, required = false)]
-        #[serde(default)]
-        unknown: ByKeyword<Unknown>,
-        /// What is told: whether there is a collision, the first one, or how far away the nearest voxel is;
-        /// `colliding` without.
-        #[schema(value_type = AnswerWord, required = false)]
-        #[serde(default)]
-        answer: ByKeyword<AnswerWord>,
-        /// How far clearances are told, meters.
-        clearance_max_m: Option<f32>,
     }
 }
 

@@ -3,18 +3,14 @@
 use axum::body::Bytes;
 
 use super::answer::Arrays;
-use super::body::{AnswerWord, DescribedIgnored, IgnoredList, collisions_answered, ignored_of};
-use super::body::{CheckedHead, CheckedResponse};
+use super::body::{CheckedHead, CheckedResponse, check_body, collisions_answered, ignored_of};
 use super::form::{CountsField, NumbersField};
 use super::handler::{AnswerOf, HttpQuestion, question_handler};
-use super::scope::question_body;
-use crate::json::described;
-use crate::json::{ByKeyword, Sphere};
+use crate::json::Sphere;
 use mrol_client::wire::pb;
-use mrol_map::planning::Unknown;
 use mrol_service::{ServiceError, SphereCheck};
 
-question_body! {
+check_body! {
     /// Spheres of the map frame.
     #[schema(example = json!({"spheres": [[1, 1, 0.5, 0.2]], "answer": "first_hit"}))]
     pub(in crate::http) struct SpheresBody {
@@ -27,21 +23,6 @@ question_body! {
         /// What every radius grows by, meters; 0 without.
         #[serde(default)]
         padding_m: f32,
-        /// Regions in which voxels do not count; 64 at most.
-        #[schema(value_type = Vec<DescribedIgnored>, required = false)]
-        #[serde(default)]
-        ignored: IgnoredList,
-        /// What voxels are that no scan saw through: free or occupied; `free` without.
-        #[schema(value_type = described::Unknown, required = false)]
-        #[serde(default)]
-        unknown: ByKeyword<Unknown>,
-        /// What is told: whether there is a collision, the first one, or how far away the nearest voxel is;
-        /// `colliding` without.
-        #[schema(value_type = AnswerWord, required = false)]
-        #[serde(default)]
-        answer: ByKeyword<AnswerWord>,
-        /// How far clearances are told, meters.
-        clearance_max_m: Option<f32>,
     }
 }
 
