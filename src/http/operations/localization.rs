@@ -29,7 +29,8 @@ two_forms! {
         search_box: Option<Object<SearchBoxBody>>,
     }
 
-    /// The parameters of a localization beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
+    /// The parameters of a localization beside points as bytes:
+    /// `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
     params LocalizationParams {
         /// The direction in which things fall, `x,y,z` in the sensor frame.
         #[param(value_type = Option<Numbers3>, inline)]

@@ -192,8 +192,8 @@ pub(super) fn collisions_answered(collisions: Collisions) -> (CheckedHead, Array
     (CheckedHead { checked, colliding_count }, arrays)
 }
 
-/// Declares the body of a check: the fields that are given, and after them those that all checks have, and all questions
-/// (see [`question_body`](super::scope::question_body)).
+/// Declares the body of a check: the fields that are given, and after them those that all checks have, and all
+/// questions (see [`question_body`](super::scope::question_body)).
 macro_rules! check_body {
     ($(#[$attribute:meta])* $visibility:vis struct $Body:ident { $($own:tt)* }) => {
         $crate::http::question::scope::question_body! {
