@@ -93,6 +93,7 @@ operations! {
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";
     GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
     ListMaps:          Some(Read),  grpc "/mrol.v1.Maps/ListMaps",               http GET "/v1/maps";
+    RenameMap:         Some(Admin), grpc "/mrol.v1.Maps/RenameMap",              http POST "/v1/maps/{map}/rename";
     DeleteMap:         Some(Admin), grpc "/mrol.v1.Maps/DeleteMap",              http DELETE "/v1/maps/{map}";
     SnapshotMap:       Some(Read),  grpc "/mrol.v1.Maps/SnapshotMap",            http GET "/v1/maps/{map}/snapshot";
     RestoreMap:        Some(Admin), grpc "/mrol.v1.Maps/RestoreMap",             http PUT "/v1/maps/{map}/snapshot";

@@ -1,4 +1,4 @@
-//! `mrol maps`: make, list, describe and delete the maps of a server.
+//! `mrol maps`: make, list, describe, rename and delete the maps of a server.
 
 use std::fmt;
 use std::fmt::Display;
@@ -25,10 +25,11 @@ EXAMPLES:
   mrol maps list
   mrol maps show office                          voxels, memory and false positives of each level
   mrol maps show office --json
+  mrol maps rename office office-2024            its revision, its robots and what undo reaches stay
   mrol maps delete office
   mrol maps list --server http://robot-7:7334    MROL_SERVER sets another default";
 
-/// Make, list, describe and delete the maps of a server
+/// Make, list, describe, rename and delete the maps of a server
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Maps {
@@ -54,6 +55,17 @@ enum Action {
     Show {
         #[command(flatten)]
         map: Named,
+    },
+    /// Give a map another name, which no map has
+    Rename {
+        /// The map's name
+        #[arg(value_name = "OLD", value_parser = parse::map_name)]
+        name: MapName,
+        /// The name that it gets: [a-z0-9][a-z0-9_-]{0,63}
+        #[arg(value_name = "NEW", value_parser = parse::map_name)]
+        to: MapName,
+        #[command(flatten)]
+        server: ServerOptions,
     },
     /// Delete a map for good
     Delete {
@@ -130,6 +142,10 @@ impl Maps {
                 let info = map.server.connect().await?.map_info(&map.name).await?;
                 output.print(&MapReport::from(&info))
             }
+            Action::Rename { name, to, server } => {
+                let info = server.connect().await?.rename_map(&name, &to).await?;
+                output.print(&Renamed { renamed: name.to_string(), map: MapReport::from(&info) })
+            }
             Action::Delete { map } => {
                 map.server.connect().await?.delete_map(&map.name).await?;
                 output.print(&Deleted { deleted: map.name.to_string() })
@@ -190,6 +206,19 @@ impl Display for Made {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = if self.created { "created" } else { "was there already" };
         write!(f, "map {} {what}: {}", self.map.name(), self.map.kind())
+    }
+}
+
+#[derive(Serialize)]
+struct Renamed {
+    renamed: String,
+    #[serde(flatten)]
+    map: MapReport,
+}
+
+impl Display for Renamed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "map {} is called {} now: {}", self.renamed, self.map.name(), self.map.kind())
     }
 }
 

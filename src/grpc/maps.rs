@@ -9,7 +9,7 @@ use super::stubs::maps_server::Maps;
 use crate::access::Authorized;
 use crate::admission::InboundBody;
 use mrol_client::wire;
-use mrol_client::wire::{pb, snapshot_bytes, snapshot_pieces, status_of};
+use mrol_client::wire::{InField, pb, snapshot_bytes, snapshot_pieces, status_of};
 use mrol_map::map::MapName;
 use mrol_service::{AllowedMaps, MapList, Reason, ServiceError};
 
@@ -45,6 +45,17 @@ impl Maps for Adapter {
         let service = service_of(&request).map_err(status_of)?;
         let (maps, unavailable) = (service.list_maps().await.map_err(status_of)?, service.unavailable_maps());
         Ok(answered(MapList { maps, unavailable }.into()))
+    }
+
+    async fn rename_map(
+        &self,
+        request: Request<pb::RenameMapRequest>,
+    ) -> Result<Response<pb::RenameMapResponse>, Status> {
+        let service = service_of(&request).map_err(status_of)?;
+        let name = map_name(&request.get_ref().map).map_err(status_of)?;
+        let to = MapName::new(&request.get_ref().to).in_field("to").map_err(status_of)?;
+        let info = service.rename_map(&name, &to).await.map_err(status_of)?;
+        Ok(answered(pb::RenameMapResponse { map: Some(info.into()) }))
     }
 
     async fn delete_map(

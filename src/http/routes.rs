@@ -59,6 +59,7 @@ handlers! {
         ListMaps => maps::list;
         CreateMap => maps::create;
         GetMap => maps::describe;
+        RenameMap => maps::rename;
         DeleteMap => maps::delete;
         SnapshotMap => map_file::take;
         RestoreMap => map_file::restore;

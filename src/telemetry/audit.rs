@@ -19,7 +19,7 @@ pub const AUDIT: &str = "mrol::audit";
 const REFUSALS_PER_S_MAX: NonZeroU32 = NonZeroU32::new(10).expect("not zero");
 
 /// Operations whose refusal and failure are lines of their own; those that are done tell by their outcome.
-const CHANGES: [&str; 5] = ["CreateMap", "DeleteMap", "RestoreMap", "DeleteVoxels", "Undo"];
+const CHANGES: [&str; 6] = ["CreateMap", "RenameMap", "DeleteMap", "RestoreMap", "DeleteVoxels", "Undo"];
 
 /// Reasons for which somebody is not let in whose key is known.
 const OF_KNOWN_KEYS: [&str; 5] =
@@ -80,7 +80,8 @@ impl Refusals {
 /// Writes a change that was made; `robot` is that of a scan that carved.
 fn write_change(operation: &str, map: Option<&str>, change: &Change, robot: Option<&str>) {
     let Change { before, after, voxels_removed, voxels_restored, .. } = change;
-    let Change { scans_undone, deletions_undone, replayed, .. } = change;
+    let Change { scans_undone, deletions_undone, replayed, renamed_to, .. } = change;
+    let renamed_to = renamed_to.as_ref().map(|name| name.as_str());
     let uuid = after.or(*before).map(|version| version.map_uuid.to_string());
     let uuid_before = before.filter(|before| after.is_some_and(|after| after.map_uuid != before.map_uuid));
     let uuid_before = uuid_before.map(|before| before.map_uuid.to_string());
@@ -88,7 +89,7 @@ fn write_change(operation: &str, map: Option<&str>, change: &Change, robot: Opti
     let (revision_before, revision) = (revision(before), revision(after));
     let outcome = if *replayed { "unchanged" } else { "done" };
     tracing::info!(
-        target: AUDIT, operation, map, robot, uuid, uuid_before, revision_before, revision, voxels_removed,
+        target: AUDIT, operation, map, renamed_to, robot, uuid, uuid_before, revision_before, revision, voxels_removed,
         voxels_restored, scans_undone, deletions_undone, outcome, "change"
     );
 }

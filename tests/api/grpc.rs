@@ -355,9 +355,11 @@ async fn a_read_waits_for_its_revision_or_its_deadline() {
 async fn who_waits_for_a_revision_hears_of_the_maps_end_at_once() {
     let patience = 10.0 * PATIENCE.as_secs_f64();
     let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = patience).await;
-    for (map, code, word) in
-        [("gone", Code::NotFound, "map_not_found"), ("other", Code::FailedPrecondition, "map_replaced")]
-    {
+    for (map, code, word) in [
+        ("gone", Code::NotFound, "map_not_found"),
+        ("renamed", Code::NotFound, "map_not_found"),
+        ("other", Code::FailedPrecondition, "map_replaced"),
+    ] {
         daemon.make_map(map).await;
         let path = format!("/v1/maps/{map}/snapshot");
         let file = daemon.get(&path).await.bytes().await.unwrap();
@@ -372,6 +374,7 @@ async fn who_waits_for_a_revision_hears_of_the_maps_end_at_once() {
         }
         let ended = match map {
             "gone" => daemon.delete("/v1/maps/gone").await,
+            "renamed" => daemon.post("/v1/maps/renamed/rename", serde_json::json!({"to": "new"})).await,
             _ => {
                 let put = client().put(daemon.url(&format!("{path}?replace=true")));
                 put.header("content-type", "application/octet-stream").body(file).send().await.unwrap()

@@ -22,6 +22,7 @@ mod query_only;
 mod questions;
 mod recovery;
 mod regions;
+mod renaming;
 mod scan_requests;
 mod sensors;
 mod sessions;

@@ -44,6 +44,14 @@ fn a_map_is_made_listed_described_and_deleted() {
     assert!(daemon.refuses(&["maps", "create", "a", "--resolution", "0.1"]).contains("map_exists"));
     assert_eq!(daemon.call(&["maps", "list"])[0]["map_uuid"], made["map_uuid"]);
     assert_eq!(daemon.call(&["maps", "show", "a"])[0]["levels"].as_array().unwrap().len(), 3);
+    let renamed = &daemon.call(&["maps", "rename", "a", "b"])[0];
+    assert_eq!((&renamed["renamed"], &renamed["map"]), (&json!("a"), &json!("b")));
+    assert_eq!(renamed["map_uuid"], made["map_uuid"]);
+    assert!(daemon.refuses(&["maps", "rename", "a", "c"]).contains("map a does not exist"));
+    assert!(daemon.refuses(&["maps", "rename", "b", "b"]).contains("map_exists"));
+    let back = mrol(&["maps", "rename", "b", "a", "--server", &daemon.0.grpc]).assert().success();
+    let line = String::from_utf8(back.get_output().stdout.clone()).unwrap();
+    assert!(line.starts_with("map b is called a now: voxels of 0.05 m, 3 levels, uuid "), "{line}");
     assert_eq!(daemon.call(&["maps", "delete", "a"]), [json!({"deleted": "a"})]);
     assert!(daemon.refuses(&["maps", "show", "a"]).contains("map a does not exist"));
     assert_eq!(daemon.stop(), Some(0));

@@ -122,6 +122,22 @@ def test_a_map_is_written_to_a_file_and_made_from_one(client: mrol.Client, cube:
     client.delete_map(other.name)
 
 
+def test_a_map_is_renamed(client: mrol.Client, cube: mrol.Map) -> None:
+    before = cube.describe().version
+    renamed = client.rename_map(cube.name, "renamed")
+    assert renamed.name == "renamed"
+    assert renamed.describe().version == before
+    with pytest.raises(mrol.NotFound):
+        cube.describe()
+    with pytest.raises(mrol.Conflict) as taken:
+        client.rename_map("renamed", "renamed")
+    assert taken.value.reason == "map_exists"
+    with pytest.raises(mrol.InvalidArgument, match="to"):
+        client.rename_map("renamed", "Not a name")
+    client.rename_map("renamed", cube.name)
+    assert cube.describe().version == before
+
+
 def test_files_that_are_none_are_refused(client: mrol.Client, cube: mrol.Map, tmp_path: Path) -> None:
     for bad in (b"", b"no map file at all" * 1000):
         (tmp_path / "bad").write_bytes(bad)

@@ -89,6 +89,16 @@ impl Client {
         self.domain(self.connection.maps().list_maps(request).await)
     }
 
+    /// Gives a map another name, which no map has; its uuid, its revision and its robots stay. Watches and changes that
+    /// are under way under the former name end with `map_not_found`.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn rename_map(&self, map: &MapName, to: &MapName) -> Result<MapInfo, ClientError> {
+        let request = self.request(pb::RenameMapRequest { map: map.to_string(), to: to.to_string() });
+        self.domain(self.connection.maps().rename_map(request).await)
+    }
+
     /// Deletes a map, in memory and on disk.
     ///
     /// # Errors

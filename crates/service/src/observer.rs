@@ -97,6 +97,8 @@ pub struct Change {
     pub deletions_undone: usize,
     /// True of a change that was done before under its request id, or had nothing to do.
     pub replayed: bool,
+    /// The name that the map got, where it was renamed.
+    pub renamed_to: Option<MapName>,
 }
 
 impl Change {
@@ -138,6 +140,11 @@ impl Change {
         let before =
             MapVersion { revision: after.revision - u64::from(made_revision), content_hash: None, ..after };
         Self { replayed: !made_revision, ..Self::of_map(Some(before), Some(after)) }
+    }
+
+    /// A map was renamed, which is at the version `at`.
+    pub(super) fn of_renaming(to: MapName, at: MapVersion) -> Self {
+        Self { before: Some(at), after: Some(at), renamed_to: Some(to), ..Self::default() }
     }
 
     /// A map was made, deleted or replaced.

@@ -105,7 +105,9 @@ fn path_parameters(operation: Operation, path: &str) -> impl Iterator<Item = Par
 /// The map of `mrol demo`, and where it would be made or deleted, another one.
 fn example_map(operation: Operation) -> &'static str {
     match operation {
-        Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => "example",
+        Operation::CreateMap | Operation::RenameMap | Operation::RestoreMap => "example",
+        // The example before it has renamed it.
+        Operation::DeleteMap => "renamed",
         _ => "demo",
     }
 }

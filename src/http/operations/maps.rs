@@ -1,4 +1,4 @@
-//! `/v1/maps`: make, describe, list and delete maps.
+//! `/v1/maps`: make, describe, list, rename and delete maps.
 
 use axum::http::StatusCode;
 use axum::response::{Json, Response};
@@ -12,6 +12,8 @@ use crate::http::forms::{Map, NoParams};
 use crate::http::middleware::Service;
 use crate::http::pieces;
 use crate::json::JsonMap;
+use crate::json::described;
+use mrol_client::wire::InField;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{LEVELS_DEFAULT, MapName, MapOrigin, MapSettings};
 use mrol_service::UnavailableMap;
@@ -135,6 +137,36 @@ pub(crate) async fn list(Service(service): Service, NoParams: NoParams) -> Resul
         unavailable: unavailable.into_iter().map(Into::into).collect(),
     };
     pieces::whole(&service, bytes, listing).await
+}
+
+/// The name that a map gets.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(example = json!({"to": "renamed"}))]
+pub(crate) struct RenameBody {
+    /// The name that no map has.
+    #[schema(value_type = described::MapName)]
+    to: String,
+}
+
+/// Gives a map another name.
+///
+/// Its uuid, its revision and its robots stay. Watches and changes that are under way under the former name end with
+/// `map_not_found`. A name that a map has is refused (`map_exists`).
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/rename",
+    request_body = RenameBody,
+    responses((status = 200, description = "Renamed", body = JsonMap))
+)]
+pub(crate) async fn rename(
+    Service(service): Service,
+    Map(name): Map,
+    body::Json(RenameBody { to }): body::Json<RenameBody>,
+) -> Result<Json<JsonMap>, HttpError> {
+    let to = MapName::new(&to).in_field("to")?;
+    let info = service.rename_map(&name, &to).await?;
+    Ok(Json(info.into()))
 }
 
 /// Deletes a map, its memory and its files.

@@ -47,6 +47,7 @@ fn body(operation: Operation) -> Body {
         Operation::Undo => Body::Json(json!({"revision": 1})),
         Operation::PutKeepOut => Body::Json(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Body::Json(json!({"resolution_m": 0.1})),
+        Operation::RenameMap => Body::Json(json!({"to": "renamed"})),
         Operation::RestoreMap => Body::File,
         Operation::ListMaps
         | Operation::GetMap

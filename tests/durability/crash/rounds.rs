@@ -35,7 +35,7 @@ const SYNCED: [&str; 2] = ["--snapshot-journal-mib", "1"];
 /// The end of a process takes nothing that was written, synced or not.
 const WRITTEN: [&str; 4] = ["--snapshot-journal-mib", "1", "--durability", "100ms"];
 
-fn rounds() -> usize {
+pub(super) fn rounds() -> usize {
     std::env::var("MROL_CRASH_ROUNDS").map_or(20, |rounds| rounds.parse().unwrap())
 }
 

@@ -6,6 +6,7 @@
 
 mod incarnations;
 mod leftovers;
+mod renaming;
 mod workload;
 
 use std::path::{Path, PathBuf};

@@ -89,6 +89,9 @@ async fn a_change_is_written_with_who_asked_for_it_and_what_it_did() {
     let undo = json!({"robot": "r1", "since_revision": 0});
     let undone = audited.http(Method::POST, "/v1/maps/a/undo", "undone", key, undo).await;
     assert_eq!(undone.status(), StatusCode::OK, "{}", undone.text().await.unwrap());
+    let renamed = audited.http(Method::POST, "/v1/maps/a/rename", "renamed", key, json!({"to": "b"})).await;
+    assert_eq!(renamed.status(), StatusCode::OK, "{}", renamed.text().await.unwrap());
+    let map = "/v1/maps/b";
     assert_eq!(
         audited.http(Method::DELETE, map, "gone", key, Value::Null).await.status(),
         StatusCode::NO_CONTENT
@@ -113,13 +116,15 @@ async fn a_change_is_written_with_who_asked_for_it_and_what_it_did() {
         ["made-again", "CreateMap", "a", "unchanged", 0, 0, 0, 0],
         ["deleted", "DeleteVoxels", "a", "done", 1, 2, 1, 0],
         ["undone", "Undo", "a", "done", 2, 3, 1, 1],
-        ["gone", "DeleteMap", "a", "done", 3, null, 0, 0],
-        ["gone-already", "DeleteMap", "a", "failed", null, null, null, null],
+        ["renamed", "RenameMap", "a", "done", 3, 3, 0, 0],
+        ["gone", "DeleteMap", "b", "done", 3, null, 0, 0],
+        ["gone-already", "DeleteMap", "b", "failed", null, null, null, null],
     ]);
     assert_eq!(Value::from(told), expected);
-    assert_eq!(lines[5]["reason"], "map_not_found");
+    assert_eq!((&lines[4]["renamed_to"], &lines[5]["renamed_to"]), (&json!("b"), &Value::Null));
+    assert_eq!(lines[6]["reason"], "map_not_found");
     let uuid = &lines[0]["uuid"];
-    assert!(uuid.is_string() && lines[1..5].iter().all(|line| line["uuid"] == *uuid), "{lines:#?}");
+    assert!(uuid.is_string() && lines[1..6].iter().all(|line| line["uuid"] == *uuid), "{lines:#?}");
 }
 
 /// What a sensor sees of a wall so far before it, a point every 1.5 degrees.

@@ -81,7 +81,7 @@ async fn a_page_of_another_site_changes_nothing_with_keys_or_without() {
         }
         changing += usize::from(operation.is_change());
     }
-    assert_eq!(changing, 8);
+    assert_eq!(changing, 9);
     let own = format!("http://{}", open.http);
     let (status, ..) = asked(&open, ("DELETE", "/v1/maps/own"), &[("origin", &own)], None).await;
     assert_eq!(status, 204);

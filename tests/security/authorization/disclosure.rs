@@ -46,6 +46,33 @@ async fn a_key_learns_nothing_of_maps_that_it_is_not_for() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_key_renames_a_map_only_between_names_that_it_may_name() {
+    let (server, key) =
+        Guarded::start_with(|keys| keys.add("own", Scope::Admin, Some(&["own", "later"]))).await;
+    server.make_map("own").await;
+    server.make_map("other").await;
+    let rename = async |map: &str, to: &str| {
+        let path = format!("/v1/maps/{map}/rename");
+        let answer = server.http(Method::POST, &path, Some(&key), Some(json!({ "to": to }))).await;
+        (answer.status(), answer.text().await.unwrap())
+    };
+    // Whether or not there is a map of the name.
+    for (map, to, refused) in [
+        ("own", "other", "other"),
+        ("own", "absent", "absent"),
+        ("other", "later", "other"),
+        ("absent", "own", "absent"),
+    ] {
+        let (status, told) = rename(map, to).await;
+        assert_eq!(status, StatusCode::FORBIDDEN, "{map} to {to}: {told}");
+        assert!(told.contains(&format!("the key is not for map {refused}: it is for later, own")), "{told}");
+    }
+    assert_eq!(server.maps().await, ["other", "own"]);
+    assert_eq!(rename("own", "later").await.0, StatusCode::OK);
+    assert_eq!(server.maps().await, ["later", "other"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn health_is_told_to_anybody_and_names_no_map() {
     let (server, ()) = Guarded::start_with(|_| ()).await;
     server.make_map("own").await;

@@ -112,6 +112,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
         }
         Operation::GetMap => pb::GetMapRequest { map }.encode_to_vec(),
         Operation::ListMaps => pb::ListMapsRequest {}.encode_to_vec(),
+        Operation::RenameMap => pb::RenameMapRequest { to: map.clone(), map }.encode_to_vec(),
         Operation::DeleteMap => pb::DeleteMapRequest { map }.encode_to_vec(),
         Operation::SnapshotMap => pb::SnapshotMapRequest { map }.encode_to_vec(),
         Operation::RestoreMap => {
@@ -174,6 +175,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
+        Operation::RenameMap => Some(json!({"to": "own"})),
         _ => None,
     }
 }
@@ -217,6 +219,7 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::StreamTrajectory
         | Operation::CreateMap
         | Operation::GetMap
+        | Operation::RenameMap
         | Operation::DeleteMap
         | Operation::SnapshotMap
         | Operation::RestoreMap => true,

@@ -58,7 +58,9 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::Metrics => Some(Scope::Read),
         Operation::InsertScan | Operation::InsertScanStream | Operation::Undo => Some(Scope::Insert),
         Operation::DeleteVoxels | Operation::PutKeepOut | Operation::DeleteKeepOut => Some(Scope::Write),
-        Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => Some(Scope::Admin),
+        Operation::CreateMap | Operation::RenameMap | Operation::DeleteMap | Operation::RestoreMap => {
+            Some(Scope::Admin)
+        }
     }
 }
 

@@ -128,6 +128,19 @@ class Client:
             {of.text("map"): of.text("reason") for of in unavailable},
         )
 
+    def rename_map(self, name: str, to: str, *, robot: str = ROBOT) -> Map:
+        """Gives a map another name, which no map has, and returns it; its uuid, its revision and its robots stay.
+
+        Watches and changes that are under way under the former name end with `NotFound` (`map_not_found`). It is not sent
+        again where the connection breaks, since somebody may have made a map of the former name meanwhile.
+
+        Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: a map has that name), `InvalidArgument` (`bad_name`).
+        """
+        renamed = Map(self._caller, word_of(to, "to"), robot, self._sessions)
+        target = path_of("v1", "maps", word_of(name, "name"), "rename")
+        self._caller.call(Request("POST", target, JSON, [json.dumps({"to": to}).encode()], is_repeatable=False))
+        return renamed
+
     def delete_map(self, name: str) -> None:
         """Deletes a map: memory and files are gone.
 

@@ -102,6 +102,14 @@ impl TryFrom<pb::GetMapResponse> for MapInfo {
     }
 }
 
+impl TryFrom<pb::RenameMapResponse> for MapInfo {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::RenameMapResponse) -> Result<Self, ServiceError> {
+        required(answer.map, "map")?.try_into()
+    }
+}
+
 impl TryFrom<pb::RestoreMapResponse> for MapInfo {
     type Error = ServiceError;
 

@@ -162,7 +162,7 @@ impl CommitQueue {
         self.ended.send_replace(true);
     }
 
-    /// Waits until the map is deleted or replaced.
+    /// Waits until the map is deleted, replaced or renamed.
     pub(crate) async fn ended(&self) {
         // The sender is there as long as this is.
         drop(self.ended.subscribe().wait_for(|ended| *ended).await);
@@ -170,7 +170,16 @@ impl CommitQueue {
 
     /// Another map takes its place: it takes no more changes here, and when this returns, none is on its way.
     pub(crate) fn end_replaced(&self) {
-        self.stopped.get_or_init(|| Stop::Replaced);
+        self.end_as(Stop::Replaced);
+    }
+
+    /// It has another name: it takes no more changes under this one, and when this returns, none is on its way.
+    pub(crate) fn end_renamed(&self) {
+        self.end_as(Stop::Renamed);
+    }
+
+    fn end_as(&self, stop: Stop) {
+        self.stopped.get_or_init(|| stop);
         let nothing = Submission::Undecided(Box::new(|_, _| Ok(None)));
         // What is still to have its turn is refused from now on. It takes no place; where the worker is gone, so are
         // its changes.

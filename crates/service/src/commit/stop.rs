@@ -13,6 +13,8 @@ pub(crate) enum Stop {
     Deleted,
     /// Another has its name now.
     Replaced,
+    /// It has another name now, which whoever knows this one may not know.
+    Renamed,
 }
 
 impl Stop {
@@ -30,6 +32,11 @@ impl Stop {
             Self::Replaced => {
                 let message = format!("map {name} was replaced by another: ask for its map_uuid");
                 ServiceError::new(Reason::MapReplaced, message)
+            }
+            Self::Renamed => {
+                let message =
+                    format!("map {name} was renamed: list the maps, and ask under the name that it has now");
+                ServiceError::new(Reason::MapNotFound, message)
             }
         }
     }

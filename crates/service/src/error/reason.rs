@@ -146,13 +146,13 @@ reasons! {
     }
     NotFound {
         KeepOutNotFound "keep_out_not_found" Both: "the map has no keep-out of this name, or it has ended", "list them";
-        MapNotFound "map_not_found" Both: "no such map, or it was deleted meanwhile", "make it; `GET /v1/maps` lists them";
+        MapNotFound "map_not_found" Both: "no such map, or it was deleted or renamed meanwhile", "make it; `GET /v1/maps` lists them";
         RobotNotFound "robot_not_found" Both: "the map knows no robot of the name whose scans are to be undone", "correct the name; the message has those that it knows";
         RouteNotFound "route_not_found" Http: "no such path", "see [operations](#operations-over-http)";
         ScanNotFound "scan_not_found" Both: "no such accepted scan, or it was undone already; no such revision", "read the trajectory";
     }
     Conflict {
-        MapExists "map_exists" Both: "a map of this name with other settings, or where one is to be restored", "another name, or `replace`";
+        MapExists "map_exists" Both: "a map of this name with other settings, or where one is to be restored or renamed", "another name, or `replace`";
         RequestIdTaken "request_id_taken" Both: "another request of this key had this id", "choose ids that are unique";
         ScanIdTaken "scan_id_taken" Both: "an accepted scan with other content has this id", "number new scans anew, in a new `session` after a restart";
     }
@@ -196,7 +196,7 @@ reasons! {
         TimeLimit "time_limit" Both: "the scan or undo took longer than `alignment_time_max_s`, `insertion_time_max_s` or `undo_time_max_s`", "send a smaller scan, or raise the limit";
     }
     Unavailable {
-        CatalogBusy "catalog_busy" Both: "a map has been made, replaced, deleted or opened for long: it is large, or its disk slow", "retry as told";
+        CatalogBusy "catalog_busy" Both: "a map has been made, replaced, renamed, deleted or opened for long: it is large, or its disk slow", "retry as told";
         Draining "draining" Both: "the server is going down", "retry elsewhere or later";
         MapReadOnly "map_read_only" Both: "the map's journal failed; it answers queries and takes no changes", "mend the disk, restart the server";
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";

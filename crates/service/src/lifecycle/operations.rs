@@ -171,6 +171,24 @@ impl MapService {
         self.observed("DeleteMap", Some(name), work, outcome).await.map(drop)
     }
 
+    /// Gives a map another name. Its uuid, its revision and what undo reaches stay; watches and changes under way under
+    /// its former name end with `map_not_found`.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `Conflict` where there is a map of the name `to`; `PermissionDenied` where the
+    /// caller may not name both; `Internal` when its folder cannot be renamed; `Unavailable` with `outcome_unknown`
+    /// when it is renamed, and a loss of power may bring its former name back.
+    pub async fn rename_map(&self, name: &MapName, to: &MapName) -> Result<MapInfo, ServiceError> {
+        let work = async {
+            let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
+            let (name, to) = (self.allowed_maps.check(name)?, self.allowed_maps.check(to)?);
+            let rename = async move { inner.catalog.rename(&name, &to, &asker).await };
+            describe_made(run_to_completion(rename).await?).await
+        };
+        let outcome = |info: &MapInfo| Outcome::Changed(Change::of_renaming(info.name.clone(), info.version));
+        self.observed("RenameMap", Some(name), work, outcome).await
+    }
+
     /// A map as a map file, at one revision.
     ///
     /// # Errors

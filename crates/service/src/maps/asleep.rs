@@ -15,7 +15,7 @@ pub(super) struct Asleep {
     /// What the list of maps tells of it, from when it fell asleep; none of one that was not opened yet.
     pub(super) info: Option<MapInfo>,
     /// What is known of its robots since the server was started, which no file has.
-    pub(super) robots: Mutex<Option<Robots>>,
+    pub(super) robots: Mutex<Option<Arc<Robots>>>,
     /// The folders that claimed to be it at the start, where it was not opened yet.
     pub(super) folders: Option<Vec<String>>,
     /// Held while it is opened, and while it falls asleep, until its files are closed.

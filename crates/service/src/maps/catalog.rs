@@ -24,7 +24,8 @@ use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::sync::{Rank, RwLock};
 use mrol_store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
 
-/// How long making, replacing or deleting a map waits for the one before: as long as a disk may reasonably take.
+/// How long making, replacing, renaming or deleting a map waits for the one before: as long as a disk may reasonably
+/// take.
 const TURN_MAX: Duration = Duration::from_secs(10);
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
@@ -219,12 +220,13 @@ impl Catalog {
         }
     }
 
-    /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up its holder.
-    async fn turn_to_write(&self) -> Result<tokio::sync::MutexGuard<'_, ()>, ServiceError> {
+    /// Waits for the turn to make, replace, rename or delete a map, not for ever: a disk that hangs may hold up its
+    /// holder.
+    pub(super) async fn turn_to_write(&self) -> Result<tokio::sync::MutexGuard<'_, ()>, ServiceError> {
         let turn = tokio::time::timeout(TURN_MAX, self.writing.lock()).await;
         turn.map_err(|_| {
             let message = format!(
-                "another map has been made, replaced or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
+                "another map has been made, replaced, renamed or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
                  try again"
             );
             ServiceError::new(Reason::CatalogBusy, message).retry_after(TURN_MAX)
@@ -386,6 +388,7 @@ mod tests {
         let busy = Reason::CatalogBusy;
         assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX, &one)).await, busy);
         assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false, &one)).await, busy);
+        assert_eq!(told(catalog.rename(&named("there"), &named("new"), &one)).await, busy);
         assert_eq!(told(catalog.delete(&named("there"), &one)).await, busy);
         // What is there already waits for nobody.
         assert!(!catalog.create(named("there"), settings, MAPS_MAX, &one).await.unwrap().1);

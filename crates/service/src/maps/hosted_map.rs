@@ -30,7 +30,7 @@ pub(crate) struct HostedMap {
     pub(crate) folder: Option<Arc<MapFolder>>,
     pub(crate) commit_queue: CommitQueue,
     pub(crate) followers: Followers,
-    pub(crate) robots: Robots,
+    pub(crate) robots: Arc<Robots>,
     /// What makes checks of bodies fast, once somebody asked for one.
     pub(crate) planner: OnceLock<Planner>,
     /// One undo is found out and made before the next is looked at.
@@ -42,7 +42,7 @@ pub(crate) struct HostedMap {
 
 /// What is left of a map that was closed.
 pub(super) struct Closed {
-    pub(super) robots: Robots,
+    pub(super) robots: Arc<Robots>,
     /// Hears when its files are closed.
     pub(super) done: oneshot::Receiver<()>,
 }
@@ -79,7 +79,7 @@ impl HostedMap {
         threads: &Arc<CommitThreads>,
         name: MapName,
         opened: OpenedMap,
-        robots: Robots,
+        robots: Arc<Robots>,
         settings: &StoreSettings,
     ) -> Self {
         let OpenedMap { uuid, map, history, folder, .. } = opened;
@@ -98,6 +98,17 @@ impl HostedMap {
         let (map, folder) = (Arc::clone(&self.map), self.folder.clone());
         let history = self.followers.recent.history();
         Self::of_shared(threads, name, self.uuid, map, history, folder, settings)
+    }
+
+    /// This map under the name `name` in the place of its own, with what is known of its robots.
+    pub(super) fn renamed(
+        &self,
+        threads: &Arc<CommitThreads>,
+        name: MapName,
+        settings: &StoreSettings,
+    ) -> Self {
+        let renamed = self.again_as(threads, name, settings);
+        Self { robots: Arc::clone(&self.robots), undo_lock: Arc::clone(&self.undo_lock), ..renamed }
     }
 
     fn of_shared(
@@ -119,7 +130,7 @@ impl HostedMap {
             folder,
             commit_queue,
             followers,
-            robots: Robots::default(),
+            robots: Arc::default(),
             planner: OnceLock::new(),
             undo_lock: Arc::default(),
             snapshots: Snapshots::default(),
@@ -189,7 +200,7 @@ impl HostedMap {
         if self.followers.wait_for_revision(revision, wait_max, &self.commit_queue).await {
             return Ok(());
         }
-        if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.commit_queue.stopped() {
+        if let Some(stop @ (Stop::Deleted | Stop::Replaced | Stop::Renamed)) = self.commit_queue.stopped() {
             return Err(stop.refusal(&self.name));
         }
         let message = format!(
@@ -250,7 +261,7 @@ impl HostedMap {
     pub(crate) fn failure(&self) -> Option<&str> {
         match self.commit_queue.stopped()? {
             Stop::Failed(reason) => Some(reason),
-            Stop::Deleted | Stop::Replaced => None,
+            Stop::Deleted | Stop::Replaced | Stop::Renamed => None,
         }
     }
 

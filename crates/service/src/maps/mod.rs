@@ -15,6 +15,7 @@ mod keep_out_expiry;
 mod named;
 mod newcomers;
 mod opening;
+mod renaming;
 mod replacing;
 mod robots;
 mod same_settings;

@@ -115,7 +115,7 @@ async fn a_map_that_is_watched_or_is_to_change_by_itself_stays_awake() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_map_that_sleeps_has_its_name_and_can_be_made_again_replaced_and_deleted() {
+async fn a_map_that_sleeps_has_its_name_and_can_be_made_again_replaced_renamed_and_deleted() {
     let data = tempfile::tempdir().unwrap();
     let service = service(data.path());
     for number in 0..2 {
@@ -131,6 +131,12 @@ async fn a_map_that_sleeps_has_its_name_and_can_be_made_again_replaced_and_delet
     assert_eq!(taken.reason, Reason::MapExists);
     service.restore_map(name(0), file, true).await.unwrap();
     service.put_unused_to_sleep().await;
+    service.rename_map(&name(1), &name(2)).await.unwrap();
+    service.put_unused_to_sleep().await;
+    assert_eq!(service.map_info(&name(2)).await.unwrap().version.revision, 1);
+    assert_eq!(insert(&service, 2, 1).await, 2);
+    service.put_unused_to_sleep().await;
+    service.rename_map(&name(2), &name(1)).await.unwrap();
     service.delete_map(&name(1)).await.unwrap();
     let names: Vec<String> = service.map_names().iter().map(ToString::to_string).collect();
     assert_eq!(names, ["tile-0", "tile-0-replaced-1"]);

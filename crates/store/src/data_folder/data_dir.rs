@@ -188,6 +188,44 @@ impl DataDir {
         Ok(aside)
     }
 
+    /// Gives a map another name, in one rename of its folder: after a crash it has one of the two. It may be in use.
+    ///
+    /// # Errors
+    /// When the system refuses, there is a map of that name, or this one was deleted. Where [`DataDir::has_name`] is
+    /// true all the same, the map has its new name, and only a loss of power could bring the former back.
+    pub fn rename(&self, folder: &MapFolder, to: &MapName) -> Result<(), StoreError> {
+        if folder.is_gone() {
+            return Err(StoreError::Gone);
+        }
+        self.clear_leftovers()?;
+        if let Some(entry) = self.folders_of(to)?.into_iter().next() {
+            return Err(StoreError::damaged(&self.maps.join(entry), format!("map {to} exists")));
+        }
+        let new = Entry::folder_name(to, folder.uuid());
+        self.forget_replacements_of(&new)?;
+        folder.move_to(&self.maps.join(new))
+    }
+
+    /// True where the folder is that of a map named `name`.
+    pub fn has_name(&self, folder: &MapFolder, name: &MapName) -> bool {
+        name_of(&folder.path()) == Entry::folder_name(name, folder.uuid())
+    }
+
+    /// Ends the replacements of a map whose folder was called `old`, which are done but for the file that says so: the
+    /// next start would take the name away from a folder that is called so again.
+    fn forget_replacements_of(&self, old: &str) -> Result<(), StoreError> {
+        for entry in self.entries()? {
+            if !matches!(Entry::of(&entry), Entry::Map { .. }) {
+                continue;
+            }
+            let folder = self.maps.join(entry);
+            if Replacement::in_folder(&*self.files, &folder)?.is_some_and(|found| found.old == old) {
+                replacement::finish(&*self.files, &folder)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Deletes a map. When this returns, the map is deleted for good, though its bytes may not all be freed.
     ///
     /// # Errors

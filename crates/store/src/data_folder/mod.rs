@@ -11,9 +11,9 @@
 //! ```
 //!
 //! The folder *is* the catalog. A map's name and uuid are its folder's; its settings are in each of its snapshots. That
-//! a map is made or deleted is one rename of its folder, which is atomic, so there is no second store that could
-//! disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions were
-//! accepted is part of the changes themselves, durable in the same record.
+//! a map is made, renamed or deleted is one rename of its folder, which is atomic, so there is no second store that
+//! could disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions
+//! were accepted is part of the changes themselves, durable in the same record.
 //!
 //! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted
 //! goes into its own folder, and never into that of the next map of its name.

@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 33] = [
+const METHODS: [&str; 34] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -41,6 +41,7 @@ const METHODS: [&str; 33] = [
     "Occupancy/ClassifyPoints",
     "Occupancy/ListFrontiers",
     "Mapping/ListEvents",
+    "Maps/RenameMap",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];
@@ -75,7 +76,7 @@ fn call(hosted: &Hosted, method: &str, message: &[u8]) -> bool {
     assert!(!DEFECTS.contains(&&*status.code) || malformed, "{method}: {} {}", status.code, status.message);
     let done = status.code == "0";
     assert!(done || hosted.revision() == before, "{method} was refused and changed the map");
-    done && ["Maps/CreateMap", "Maps/DeleteMap", "Maps/RestoreMap"].contains(&method)
+    done && ["Maps/CreateMap", "Maps/RenameMap", "Maps/DeleteMap", "Maps/RestoreMap"].contains(&method)
 }
 
 fn request(method: &str, message: &[u8]) -> Request<Body> {
