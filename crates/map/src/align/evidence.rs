@@ -25,8 +25,8 @@ pub(super) fn is_vouched_for(RayAgreement { of_scan, of_map }: &RayAgreement) ->
     [of_scan, of_map].into_iter().any(|side| expected_share(side) >= AGREEMENT_MIN)
 }
 
-/// True of a pose at which the scan and earlier scans saw enough of each other, and most of what is known of either side
-/// agrees.
+/// True of a pose at which the scan and earlier scans saw enough of each other, and most of what is known of either
+/// side agrees.
 pub(crate) fn agrees_both_ways(agreement: &RayAgreement) -> bool {
     has_evidence(agreement) && agreement.worse() >= AGREEMENT_MIN
 }
