@@ -52,6 +52,64 @@ fn a_scan_of_nothing_but_no_returns_is_named() {
 }
 
 #[test]
+fn a_scan_without_a_return_is_skipped_and_the_map_of_the_others_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let wall = |y: i32| (0..40).map(move |i| format!("3 {} {}\n", f64::from(y) / 10.0, f64::from(i) / 10.0));
+    let seen: String = (0..40).flat_map(wall).collect();
+    for (name, content) in [("0", "nan 0 0\n"), ("1", &seen), ("2", ""), ("3", "0 0 0\n"), ("4", &seen)] {
+        std::fs::write(folder.path().join(format!("scan{name}.xyz")), content).unwrap();
+    }
+    let (scans, out) = (folder.path().to_str().unwrap(), folder.path().join("a.mrol"));
+    let arguments =
+        ["map", scans, "--resolution", "0.1", "--first-pose", "0 0 5 0 0 0 1", "--lookup", "exact"];
+    let lines = super::objects(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());
+    let told: Vec<_> = lines.iter().map(|line| (&line["skipped"], &line["accepted"])).take(5).collect();
+    let (yes, no, none) = (&true.into(), &false.into(), &serde_json::Value::Null);
+    // A wall alone does not say where it was seen from again.
+    assert_eq!(told, [(yes, no), (none, yes), (yes, no), (yes, no), (none, no)]);
+    assert!(
+        lines[0]["reason"].as_str().unwrap().contains("none of its 1 points is a return"),
+        "{}",
+        lines[0]
+    );
+    assert_eq!(lines[2]["reason"], "no point in this file");
+    // The first pose is that of the first scan that is mapped.
+    assert_eq!(lines[1]["map_from_sensor"]["translation_m"][2], 5.0);
+    let summary = &lines[5]["summary"];
+    assert_eq!(
+        (&summary["scans"], &summary["accepted"], &summary["skipped"]),
+        (&5.into(), &1.into(), &3.into())
+    );
+    assert!(out.is_file());
+    let said = mrol(&arguments).assert().success().get_output().stdout.clone();
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("scan2.xyz  skipped       no point in this file"), "{said}");
+    assert!(said.contains("5 scans, 1 accepted, 1 refused, 3 skipped: "), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_refused_and_not_waited_for() {
+    let (folder, path) = file("scan0.xyz", b"1 0 0\n");
+    let pipe = folder.path().join("scan1.xyz");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pipe = pipe.to_str().unwrap();
+    let refused = |arguments: &[&str]| {
+        let said = complaint(arguments, 1);
+        assert!(
+            said.contains("scan1.xyz: a named pipe") && said.contains("write it to a file first"),
+            "{said}"
+        );
+    };
+    refused(&["map", &path, pipe, "--resolution", "0.1"]);
+    refused(&["insert", pipe, "--map", "a", "--server", "http://127.0.0.1:9"]);
+    let device = folder.path().join("null.xyz");
+    std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+    let said = complaint(&["map", device.to_str().unwrap(), "--resolution", "0.1"], 1);
+    assert!(said.contains("null.xyz: a device"), "{said}");
+}
+
+#[test]
 fn numbers_out_of_range_are_usage_errors_that_name_the_range() {
     let (_folder, path) = file("scan.xyz", b"1 0 0\n");
     for (option, value, text) in [

@@ -4,6 +4,7 @@
 
 mod crates;
 mod documents;
+mod first_commands;
 mod layering;
 mod proto_compatibility;
 #[path = "../support/mod.rs"]

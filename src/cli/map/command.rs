@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use nalgebra::Point3;
 use uuid::Uuid;
 
-use super::report::{ScanLine, Summary};
+use super::report::{ScanLine, SkippedLine, Summary};
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use crate::cli::scan_report::{name_of, tell_order};
 use mrol::console::CliError;
@@ -41,7 +42,7 @@ EXAMPLES:
                                                              serve the map
 
 The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is
-aligned from the last accepted pose; one that does not align is left out. With --truth line k of the file belongs to
+aligned from the last accepted pose; one that does not align is left out, and one without a return is skipped. With --truth line k of the file belongs to
 scan k, and errors are those of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a
 last object \"summary\" is printed when --truth, --poses or --lookup is given. Whether the filters are ample is said
 when --lookup is given.";
@@ -154,12 +155,17 @@ impl Map {
         let output = output.with_bar(files.len());
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
-            let (points, skipped) = usable_points(file, &filter, &survey)?;
-            let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
-            output.print(&run.note(k, file, &mapped, skipped))?;
+            match usable_points(file, &filter, &survey)? {
+                Usable::Points(points, skipped) => {
+                    let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
+                    output.print(&run.note(k, file, &mapped, skipped))?;
+                }
+                Usable::Nothing(why) => output.print(&run.skip(file, why))?,
+            }
             output.step();
         }
         output.clear_bar();
+        run.check_any()?;
         self.write_results(&mapper, &run)?;
         // Programs get only the scans, unless they ask for what is in the summary.
         if !output.is_json() || self.poses_file().is_some() || self.lookup.is_some() {
@@ -170,15 +176,26 @@ impl Map {
 
     /// How the scans lie to the map, and the map's origin, if it is to have one.
     fn survey(&self, files: &[PathBuf], output: &Output) -> Result<(Survey, Option<MapOrigin>), CliError> {
-        let Some(file) = files.first() else {
-            return Ok((Survey::of(&[], None, false, self.resolution), None));
+        let Some((file, first)) = self.first_with_returns(files)? else {
+            return Ok((Survey::of(&[], None, false, self.resolution).with_columns(self.columns), None));
         };
-        let first = read_exact_points_by(file, self.columns)?;
         let origin = self.origin.map(|choice| choice.origin(file, &first)).transpose()?;
         let has_poses = self.first_pose.is_some() || self.at_poses();
         let survey = Survey::of(&first, origin, has_poses, self.resolution);
         survey.note_unit(file, &first, output);
         Ok((survey.with_columns(self.columns), origin))
+    }
+
+    /// The first file with a point that is a return, and its points.
+    fn first_with_returns<'a>(&self, files: &'a [PathBuf]) -> Result<Option<ExactScan<'a>>, CliError> {
+        let filter = PointFilter { keep_zeros: self.keep_zeros, ..PointFilter::default() };
+        for file in files {
+            let points = read_exact_points_by(file, self.columns)?;
+            if points.iter().any(|point| filter.is_return(Point::from(*point))) {
+                return Ok(Some((file, points)));
+            }
+        }
+        Ok(None)
     }
 
     fn mount(&self) -> SensorMount {
@@ -240,6 +257,9 @@ impl Map {
     }
 }
 
+/// A scan file and its points, as it has them.
+type ExactScan<'a> = (&'a Path, Vec<Point3<f64>>);
+
 /// State of a run.
 struct Run {
     survey: Survey,
@@ -247,7 +267,11 @@ struct Run {
     at_truth: bool,
     truth: Option<TruthErrors>,
     trajectory: Vec<StampedPose>,
+    /// Scans that were mapped or refused.
     scans: usize,
+    /// Scans that had no point to map, and why the first of them had none.
+    skipped: usize,
+    first_skipped: Option<CliError>,
     false_positives: FalsePositives,
     name_width: usize,
     start: Instant,
@@ -264,6 +288,8 @@ impl Run {
             truth: truth.map(TruthErrors::new),
             trajectory: Vec::new(),
             scans: 0,
+            skipped: 0,
+            first_skipped: None,
             false_positives: FalsePositives::default(),
             name_width: crate::cli::scan_report::name_width(files),
             start: Instant::now(),
@@ -277,7 +303,22 @@ impl Run {
     /// Known pose of scan `k`, map_from_sensor, if there is one.
     fn guess(&self, k: usize) -> Option<Pose> {
         let truth = self.truth.as_ref().filter(|_| self.at_truth);
-        truth.map(|truth| truth.pose(k)).or(self.first_pose.filter(|_| k == 0))
+        truth.map(|truth| truth.pose(k)).or(self.first_pose.filter(|_| self.scans == 0))
+    }
+
+    /// Records a scan that has no point to map; returns its line.
+    fn skip(&mut self, file: &Path, why: String) -> SkippedLine {
+        self.skipped += 1;
+        self.first_skipped.get_or_insert_with(|| in_file(file, &why));
+        SkippedLine::of(name_of(file), why, self.name_width)
+    }
+
+    /// Refuses a run in which no scan had a point to map: there is no map to write.
+    fn check_any(&mut self) -> Result<(), CliError> {
+        match self.first_skipped.take().filter(|_| self.scans == 0) {
+            Some(why) => Err(why),
+            None => Ok(()),
+        }
     }
 
     /// Records the result of scan `k`; returns its line.
@@ -298,9 +339,10 @@ impl Run {
     /// The summary of the run; that of the filters where somebody asked them by name.
     fn summary(&self, mapper: &Mapper, asked: Option<Lookup>) -> Summary {
         Summary {
-            scans: self.scans,
+            scans: self.scans + self.skipped,
             accepted: self.trajectory.len(),
             refused: self.scans - self.trajectory.len(),
+            skipped: self.skipped,
             voxels: mapper.map().voxels(0),
             resolution_m: mapper.map().settings().resolution_m,
             levels: mapper.map().settings().levels,
@@ -312,27 +354,29 @@ impl Run {
     }
 }
 
+/// What a scan file has for the map.
+enum Usable {
+    /// Points that pass the filter, and how many do not.
+    Points(Vec<Point>, SkippedPoints),
+    /// No point that passes, for this reason.
+    Nothing(String),
+}
+
 /// Reads the points of a scan that pass the filter, and counts those that do not.
-fn usable_points(
-    file: &Path,
-    filter: &PointFilter,
-    survey: &Survey,
-) -> Result<(Vec<Point>, SkippedPoints), CliError> {
+fn usable_points(file: &Path, filter: &PointFilter, survey: &Survey) -> Result<Usable, CliError> {
     let mut points = survey.read(file)?;
     let skipped = SkippedPoints::of(&points, filter);
     points.retain(|&point| filter.keeps(point));
-    match (skipped.points, points.is_empty()) {
-        (0, _) => Err(in_file(file, "no point in this file")),
-        (all, true) if skipped.not_finite + skipped.zeros == all => Err(in_file(
-            file,
-            format!("none of its {all} points is a return ({skipped}); --keep-zeros keeps those at 0 0 0"),
+    Ok(match (skipped.points, points.is_empty()) {
+        (0, _) => Usable::Nothing("no point in this file".to_owned()),
+        (all, true) if skipped.not_finite + skipped.zeros == all => Usable::Nothing(format!(
+            "none of its {all} points is a return ({skipped}); --keep-zeros keeps those at 0 0 0"
         )),
-        (_, true) => Err(in_file(
-            file,
-            format!("none of its points passes --range-min, --range-max and --body ({skipped})"),
+        (_, true) => Usable::Nothing(format!(
+            "none of its points passes --range-min, --range-max and --body ({skipped})"
         )),
-        _ => Ok((points, skipped)),
-    }
+        _ => Usable::Points(points, skipped),
+    })
 }
 
 fn in_file(file: &Path, problem: impl std::fmt::Display) -> CliError {

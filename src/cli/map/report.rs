@@ -118,12 +118,37 @@ impl Display for ScanLine {
     }
 }
 
+/// The line of a scan that has no point to map.
+#[derive(Serialize)]
+pub(super) struct SkippedLine {
+    scan: String,
+    accepted: bool,
+    skipped: bool,
+    reason: String,
+    #[serde(skip)]
+    name_width: usize,
+}
+
+impl SkippedLine {
+    pub(super) fn of(scan: String, reason: String, name_width: usize) -> Self {
+        Self { scan, accepted: false, skipped: true, reason, name_width }
+    }
+}
+
+impl Display for SkippedLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<width$}  skipped       {}", self.scan, self.reason, width = self.name_width)
+    }
+}
+
 /// Summary of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Summary {
     pub(super) scans: usize,
     pub(super) accepted: usize,
     pub(super) refused: usize,
+    /// Scans that had no point to map.
+    pub(super) skipped: usize,
     pub(super) voxels: usize,
     pub(super) resolution_m: f64,
     pub(super) levels: u32,
@@ -140,6 +165,7 @@ impl Serialize for Summary {
                 "scans": self.scans,
                 "accepted": self.accepted,
                 "refused": self.refused,
+                "skipped": self.skipped,
                 "voxels": self.voxels,
                 "seconds": self.seconds,
                 "error_m": self.error.map(|error| error.meters),
@@ -155,10 +181,11 @@ impl Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "\n{} scans, {} accepted, {} refused: {} voxels of {} m, {} levels, in {:.1} s",
+            "\n{} scans, {} accepted, {} refused{}: {} voxels of {} m, {} levels, in {:.1} s",
             self.scans,
             self.accepted,
             self.refused,
+            if self.skipped > 0 { format!(", {} skipped", self.skipped) } else { String::new() },
             count(self.voxels),
             self.resolution_m,
             self.levels,

@@ -35,6 +35,14 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
     },
+    /// What is there is a pipe, a socket or a device, which may have no end.
+    #[error("{path}: {what}, and a scan is read from a regular file alone: write it to a file first")]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+        /// What is there: a named pipe, for example.
+        what: &'static str,
+    },
     /// A directory has no scan file.
     #[error("{path}: no scan file in this directory, supported are {}", EXTENSIONS.join(" "))]
     Empty {

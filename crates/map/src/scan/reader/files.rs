@@ -48,6 +48,8 @@ pub fn read_exact_points_by(path: &Path, columns: Option<Columns>) -> Result<Vec
 
 fn read<C: Coordinates>(path: &Path, columns: Option<Columns>) -> Result<Vec<C>, ReadError> {
     let format = Format::named_by(path)?;
+    // Whoever opens a named pipe waits for its writer.
+    check_regular(path, &fs::metadata(path).map_err(ReadError::io(path))?)?;
     let bytes = read_file(path)?;
     format.points(&bytes, columns).map_err(|problem| problem.in_file(path))
 }
@@ -64,15 +66,17 @@ pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> 
 /// their names (scan2 before scan10), a file itself.
 ///
 /// # Errors
-/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read,
-/// or a directory has no scan file.
+/// When a path does not exist, a file has an extension that [`read_points`] does not know or is none (a named pipe), a
+/// directory cannot be read, or a directory has no scan file.
 pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for path in paths {
-        if fs::metadata(path).map_err(ReadError::io(path))?.is_dir() {
+        let metadata = fs::metadata(path).map_err(ReadError::io(path))?;
+        if metadata.is_dir() {
             files.extend(files_of_directory(path)?);
         } else {
             Format::named_by(path)?;
+            check_regular(path, &metadata)?;
             files.push(path.clone());
         }
     }
@@ -92,6 +96,37 @@ fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
     }
     files.sort_by(|a, b| compare_names(a, b));
     Ok(files)
+}
+
+/// Refuses what may have no end.
+fn check_regular(path: &Path, metadata: &fs::Metadata) -> Result<(), ReadError> {
+    match what_else(metadata.file_type()) {
+        Some(what) => Err(ReadError::NotAFile { path: path.to_owned(), what }),
+        None => Ok(()),
+    }
+}
+
+/// What is there in the place of a regular file.
+#[cfg(unix)]
+fn what_else(there: fs::FileType) -> Option<&'static str> {
+    use std::os::unix::fs::FileTypeExt;
+    match there {
+        it if it.is_file() => None,
+        it if it.is_dir() => Some("a folder"),
+        it if it.is_fifo() => Some("a named pipe"),
+        it if it.is_socket() => Some("a socket"),
+        _ => Some("a device"),
+    }
+}
+
+/// What is there in the place of a regular file.
+#[cfg(not(unix))]
+fn what_else(there: fs::FileType) -> Option<&'static str> {
+    match there {
+        it if it.is_file() => None,
+        it if it.is_dir() => Some("a folder"),
+        _ => Some("no file"),
+    }
 }
 
 /// The content of the file at `path`, at most [`FILE_BYTES_MAX`] whatever its metadata says.
