@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use mrol_map::map::TrajectorySpacing;
+use crate::json::ByKeyword;
+use mrol_map::map::{KeptPoses, TrajectorySpacing};
 use mrol_service::section;
 use mrol_store::{Durability, StoreMode, StoreSettings};
 
@@ -28,6 +29,8 @@ section! {
         /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
         /// execution.
         mode: StoreMode = StoreSettings::default().mode; none, #[serde(with = "as_text")];
+        /// Poses that undo reaches no more: keep those that lie apart (`spaced`), or every one (`all`).
+        keep_trajectory: ByKeyword<KeptPoses> = ByKeyword::default(); none;
         /// Distance between old poses that are kept.
         trajectory_spacing_m: f64 = StoreSettings::default().trajectory_spacing.distance_m; m, from 0.01, to 1000;
         /// Rotation between them.
@@ -48,6 +51,7 @@ impl StoreConfig {
             watch_bytes_max: self.watch_bytes_max,
             mode: self.mode,
             trajectory_spacing: TrajectorySpacing {
+                keep: self.keep_trajectory.0,
                 distance_m: self.trajectory_spacing_m,
                 rotation_deg: self.trajectory_spacing_deg,
                 seconds: self.trajectory_spacing_s,

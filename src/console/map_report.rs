@@ -59,9 +59,14 @@ impl Display for MapReport {
         let robots = if map.robots.is_empty() { "nobody".into() } else { map.robots.join(", ") };
         let moments = if map.settings.moments { bytes(map.moment_bytes) } else { "none kept".into() };
         let sets = bytes(map.set_bytes);
-        let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));
+        let (scans, trajectory) = (count(map.scans), bytes(map.trajectory_bytes));
+        let thinned =
+            if map.poses < map.scans { format!(" ({} poses kept)", count(map.poses)) } else { String::new() };
         let (viewpoints, seen) = (count(map.viewpoints), bytes(map.viewpoint_bytes));
-        write!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}, ")?;
+        write!(
+            f,
+            "{scans} scans{thinned} from {robots}; exact sets {sets}, moments {moments}, trajectory {trajectory}, "
+        )?;
         writeln!(f, "{viewpoints} viewpoints {seen}")?;
         if let Some([x, y, z]) = map.settings.origin_m {
             writeln!(

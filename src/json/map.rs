@@ -32,6 +32,8 @@ pub struct JsonMap {
     pub levels: Vec<JsonLevel>,
     /// Scans that were accepted and not undone.
     pub scans: usize,
+    /// Those of them whose poses are kept: old poses are thinned.
+    pub poses: usize,
     /// The robots that sent them, by name.
     pub robots: Vec<String>,
     /// The last scan of each robot since the server was started; of one map alone.
@@ -193,6 +195,7 @@ impl From<MapInfo> for JsonMap {
             settings: info.settings.into(),
             levels: info.levels.iter().map(Into::into).collect(),
             scans: info.scans,
+            poses: info.poses,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             sightings: info.sightings.iter().map(Into::into).collect(),
             asleep: info.is_asleep,

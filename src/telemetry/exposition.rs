@@ -99,9 +99,14 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
         family.sample(&[("map", &map.name)], map.version.revision);
     }
     let mut family =
-        Family::begin(text, "mrol_map_scans", Kind::Gauge, "Accepted scans whose poses are kept, by map");
+        Family::begin(text, "mrol_map_scans", Kind::Gauge, "Scans that were accepted and not undone, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.scans);
+    }
+    let mut family =
+        Family::begin(text, "mrol_map_poses", Kind::Gauge, "Those of them whose poses are kept, by map");
+    for map in maps {
+        family.sample(&[("map", &map.name)], map.poses);
     }
     write_storage(text, maps);
 }

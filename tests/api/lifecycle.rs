@@ -245,6 +245,7 @@ async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
         r#"mrol_map_voxels{map="a",level="0"} 17"#,
         r#"mrol_map_revision{map="a"} 2"#,
         r#"mrol_map_scans{map="a"} 1"#,
+        r#"mrol_map_poses{map="a"} 1"#,
         r#"mrol_map_set_bytes{map="a"} "#,
         r#"mrol_map_filter_bytes{map="a",level="0",part="plane"} "#,
         r#"mrol_filter_false_positive_rate{map="a",level="0",kind="expected"} "#,

@@ -1,6 +1,7 @@
 //! Trajectories: thinned where undo reaches no more, with ids that stay known, and given out in pages and pieces.
 
 use mrol::config::Config;
+use mrol::map::KeptPoses;
 use mrol::wire::pb;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -8,7 +9,7 @@ use tempfile::TempDir;
 use tokio_stream::StreamExt;
 use tonic::Code;
 
-use crate::support::daemon::{Daemon, json_of, pose_json, row, scan_pb};
+use crate::support::daemon::{Daemon, client, json_of, pose_json, row, scan_pb};
 
 /// Undo reaches as little as it may.
 fn short_undo(config: &mut Config) {
@@ -99,6 +100,45 @@ async fn a_thinned_trajectory_is_no_illness() {
     assert!(thinned > 1, "nothing was thinned");
 }
 
+/// Puts the map file of a map of twenty scans from one place into a new data folder, and starts the server there twice:
+/// the number of scans, of kept poses, and of poses in the trajectory.
+async fn mapped_restored_and_started_again(keep: KeptPoses) -> (u64, u64, usize) {
+    let mapped = Daemon::start().await;
+    mapped.make_map("a").await;
+    for id in 1..=20 {
+        insert(&mapped, "r", id, 0.0).await;
+    }
+    insert(&mapped, "r", 21, 0.0).await;
+    let undone = mapped.post("/v1/maps/a/undo", json!({"robot": "r", "scan_id": 21})).await;
+    assert_eq!(undone.status(), StatusCode::OK);
+    let file = mapped.get("/v1/maps/a/snapshot").await.bytes().await.unwrap();
+    let kept = |config: &mut Config| config.store.keep_trajectory.0 = keep;
+    let restored = Daemon::start_with(kept).await;
+    let put = client().put(restored.url("/v1/maps/a/snapshot"));
+    let put = put.header("content-type", "application/octet-stream").body(file);
+    assert_eq!(put.send().await.unwrap().status(), StatusCode::CREATED);
+    let mut data = restored.stop().await;
+    for _ in 0..2 {
+        data = Daemon::start_in(data, kept).await.stop().await;
+    }
+    let daemon = Daemon::start_in(data, kept).await;
+    let told = json_of(daemon.get("/v1/maps/a").await).await;
+    let listed = json_of(daemon.get("/v1/maps").await).await;
+    assert_eq!((&listed["maps"][0]["scans"], &listed["maps"][0]["poses"]), (&told["scans"], &told["poses"]));
+    let count = |field: &str| told[field].as_u64().unwrap();
+    (count("scans"), count("poses"), ids(&poses(&daemon, "").await).len())
+}
+
+#[tokio::test]
+async fn a_restored_map_counts_all_of_its_scans_and_says_how_many_poses_are_kept() {
+    assert_eq!(mapped_restored_and_started_again(KeptPoses::Spaced).await, (20, 3, 3));
+}
+
+#[tokio::test]
+async fn where_every_pose_is_to_be_kept_a_restored_map_has_its_whole_trajectory() {
+    assert_eq!(mapped_restored_and_started_again(KeptPoses::All).await, (20, 20, 20));
+}
+
 #[tokio::test]
 async fn a_page_is_charged_as_the_page_and_not_as_the_trajectory() {
     // Of memory for bodies and answers: room for a page, and not for the pieces of all poses.
@@ -134,9 +174,9 @@ async fn a_map_in_memory_is_thinned_too() {
     let answers = robot.insert_scan_stream(tokio_stream::iter(requests)).await.unwrap().into_inner();
     assert_eq!(answers.map(Result::unwrap).collect::<Vec<_>>().await.len(), 5000);
     let info = json_of(daemon.get("/v1/maps/a").await).await;
-    let scans = info["scans"].as_u64().unwrap();
-    assert!((600..=1100).contains(&scans), "{info}");
-    assert!(info["trajectory_bytes"].as_u64().unwrap() > scans * 100, "{info}");
+    let poses = info["poses"].as_u64().unwrap();
+    assert!((600..=1100).contains(&poses) && info["scans"] == 5000, "{info}");
+    assert!(info["trajectory_bytes"].as_u64().unwrap() > poses * 100, "{info}");
 }
 
 #[tokio::test]

@@ -64,7 +64,8 @@ def test_keys_open_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert a.keep_outs().keep_outs[0].made_by == "admin"
         assert made.revision == 2
         monkeypatch.setenv("MROL_KEY", reader)
-        assert mrol.connect(server.address).map("a").describe().scans == 1
+        told = mrol.connect(server.address).map("a").describe()
+        assert (told.scans, told.poses) == (1, 1)
         monkeypatch.delenv("MROL_KEY")
         (tmp_path / "reader.key").write_text(f"{reader}\n")
         monkeypatch.setenv("MROL_KEY_FILE", str(tmp_path / "reader.key"))

@@ -78,8 +78,8 @@ pub(crate) use shards::TierView;
 pub use shards::{OccupiedVoxelList, SHARDS};
 pub use state_hash::StateHash;
 pub use trajectory::{
-    ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
-    ScanRecord, Trajectory, TrajectorySpacing, ViewpointRecord, WithdrawnChange,
+    ForgottenIds, ID_RANGES_PER_SESSION_MAX, KeptPoses, KnownScan, MappedScan, OverlapOfNoLevel,
+    SESSIONS_PER_ROBOT_MAX, ScanRecord, Trajectory, TrajectorySpacing, ViewpointRecord, WithdrawnChange,
 };
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Reversal, VoxelOwnership};

@@ -30,8 +30,10 @@ pub struct MapInfo {
     pub settings: MapSettings,
     /// Finest first.
     pub levels: Vec<LevelInfo>,
-    /// Accepted scans whose poses are kept.
+    /// Scans that were accepted and not undone.
     pub scans: usize,
+    /// Those of them whose poses are kept.
+    pub poses: usize,
     /// The robots that sent the scans, by name.
     pub robots: Vec<RobotName>,
     /// The last scan of each robot since the server was started, by name, whether it was accepted or not; of a list of

@@ -44,6 +44,7 @@ pub(super) mod number {
     pub(in crate::snapshots) const NO_MOMENTS: u64 = 17;
     pub(in crate::snapshots) const VIEWPOINTS: u64 = 18;
     pub(in crate::snapshots) const ORIGIN: u64 = 19;
+    pub(in crate::snapshots) const THINNED_SCANS: u64 = 20;
 
     /// Field of `Voxels` and of `Moments`.
     pub(in crate::snapshots) const KEY_GAPS: u64 = 1;
@@ -100,6 +101,7 @@ pub(super) struct Body<'a> {
     voxels: Option<&'a [u8]>,
     moments: Option<&'a [u8]>,
     scans: usize,
+    thinned: u64,
     withdrawn: usize,
     requests: usize,
     forgotten: Vec<&'a [u8]>,
@@ -128,6 +130,7 @@ impl<'a> Body<'a> {
             voxels: None,
             moments: None,
             scans: 0,
+            thinned: 0,
             withdrawn: 0,
             requests: 0,
             forgotten: Vec::new(),
@@ -167,7 +170,8 @@ impl<'a> Body<'a> {
             (number::KEEP_OUTS, Bytes(_)) => self.keep_outs += 1,
             (number::VIEWPOINTS, Bytes(_)) => {}
             (number::ORIGIN, Bytes(origin)) if self.origin.is_none() => self.origin = Some(origin),
-            (known @ number::UUID..=number::ORIGIN, _) => {
+            (number::THINNED_SCANS, Varint(scans)) => self.thinned = scans,
+            (known @ number::UUID..=number::THINNED_SCANS, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // A field of a newer version, which is reported where it matters.
@@ -235,6 +239,12 @@ impl<'a> Body<'a> {
             if count > most {
                 return Err(MapFileError::TooLarge { what, count, limit, most });
             }
+        }
+        if self.thinned.saturating_add(self.scans as u64) > self.revision {
+            return Err(MapFileError::Bad(format!(
+                "{} scans and {} without a pose of a map at revision {}",
+                self.scans, self.thinned, self.revision
+            )));
         }
         if self.requests > REQUESTS_KEPT {
             let message = format!("{} requests, a map remembers {REQUESTS_KEPT}", self.requests);
@@ -326,7 +336,8 @@ impl<'a> Body<'a> {
             forgotten.push(decoded::<pb::ForgottenScans>(robot, "forgotten scans")?);
         }
         let trajectory = with_forgotten(Trajectory::default(), &forgotten, self.stop)?;
-        Ok(trajectory.with_poses(self.stop.paced(scans, SCANS_PER_STOP_CHECK), withdrawn))
+        let trajectory = trajectory.with_poses(self.stop.paced(scans, SCANS_PER_STOP_CHECK), withdrawn);
+        Ok(trajectory.with_thinned(self.thinned))
     }
 
     fn scans(&self) -> Result<Vec<MappedScan>, Unreadable> {

@@ -120,6 +120,7 @@ fn trajectory_of(pose: MappedScan) -> Trajectory {
         .with_forgotten(&r0, &ids(Some(&session), 17))
         .with_forgotten(&r0, &ids(None, 0))
         .with_poses([undone, pose], vec![WithdrawnChange { change: 39, revision: 42 }])
+        .with_thinned(7)
 }
 
 /// All of it in one message.
@@ -149,6 +150,7 @@ fn message(snapshot: &Snapshot) -> pb::Snapshot {
             .settings
             .origin
             .map(|origin| pb::MapOrigin { position_m: origin.position_m.to_vec() }),
+        thinned_scans: trajectory.thinned(),
     }
 }
 
@@ -168,6 +170,20 @@ fn the_origin_of_a_map_is_kept_to_the_last_bit_and_a_broken_one_is_refused() {
         let origin = Some(pb::MapOrigin { position_m });
         let error = read(&pb::Snapshot { origin, ..message(&snapshot()) }).unwrap_err();
         assert!(format!("{error:?}").contains("origin"), "{error:?}");
+    }
+}
+
+#[test]
+fn how_many_scans_have_no_pose_is_kept_and_more_than_there_are_revisions_are_refused() {
+    let again = Snapshot::decode(&snapshot().encode().unwrap()).unwrap();
+    let (scans, poses) = (again.contents.trajectory.scans(), again.contents.trajectory.len() as u64);
+    assert_eq!(scans, poses + 7);
+    // As earlier versions wrote it.
+    let without = read(&pb::Snapshot { thinned_scans: 0, ..message(&snapshot()) }).unwrap();
+    assert_eq!(without.contents.trajectory.scans(), poses);
+    for thinned_scans in [snapshot().contents.revision, u64::MAX] {
+        let error = read(&pb::Snapshot { thinned_scans, ..message(&snapshot()) }).unwrap_err();
+        assert!(format!("{error:?}").contains("without a pose of a map at revision"), "{error:?}");
     }
 }
 

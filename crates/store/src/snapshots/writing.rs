@@ -54,7 +54,8 @@ pub(super) fn body_of(snapshot: &Snapshot, viewpoints: &ViewpointSet, stop: Stop
     let viewpoints = viewpoints.iter().map(|(revision, viewpoint)| (revision, &**viewpoint));
     append(&mut body, viewpoints, stop, |viewpoints| pb::Snapshot { viewpoints, ..Default::default() });
     let origin = settings.origin.map(|origin| pb::MapOrigin { position_m: origin.position_m.to_vec() });
-    body.append(&mut pb::Snapshot { origin, ..Default::default() }.encode_to_vec());
+    let thinned_scans = trajectory.thinned();
+    body.append(&mut pb::Snapshot { origin, thinned_scans, ..Default::default() }.encode_to_vec());
     body
 }
 

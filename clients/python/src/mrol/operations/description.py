@@ -75,6 +75,8 @@ class MapInfo(Versioned):
     """The levels, finest first."""
     scans: int
     """Scans that were accepted and not undone."""
+    poses: int
+    """Those of them whose poses are kept: a server thins old poses, unless its `store.keep_trajectory` is `all`."""
     robots: tuple[str, ...]
     sightings: tuple[Sighting, ...]
     asleep: bool
@@ -116,6 +118,7 @@ def map_info(fields: Fields) -> MapInfo:
         origin_m=settings.numbers("origin_m", (3,)) if settings.has("origin_m") else None,
         levels=tuple(_level(of) for of in fields.objects("levels")),
         scans=fields.whole("scans"),
+        poses=fields.whole("poses"),
         robots=fields.texts("robots"),
         sightings=tuple(_sighting(of) for of in fields.objects("sightings")) if fields.has("sightings") else (),
         asleep=fields.flag("asleep"),

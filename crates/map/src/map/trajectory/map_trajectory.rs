@@ -7,7 +7,7 @@ use super::chunked::{Chunked, Keyed};
 use super::known_scan::{ForgottenIds, KnownScan};
 use super::robot_scans::{KnownId, RobotScans};
 use super::scan::{MappedScan, WithdrawnChange};
-use super::thinning::TrajectorySpacing;
+use super::thinning::{KeptPoses, TrajectorySpacing};
 use crate::map::name::{RobotName, SessionName};
 
 impl Keyed for MappedScan {
@@ -29,6 +29,8 @@ pub struct Trajectory {
     /// Revisions of the scans of `poses` that were taken out again.
     marked: Arc<BTreeSet<u64>>,
     withdrawn: Arc<Vec<WithdrawnChange>>,
+    /// Scans that were accepted and not undone, and whose poses were thinned.
+    thinned: u64,
     /// Bytes that poses point to.
     overlap_bytes: usize,
 }
@@ -37,6 +39,16 @@ impl Trajectory {
     /// In the order of acceptance.
     pub fn poses(&self) -> impl DoubleEndedIterator<Item = &MappedScan> {
         self.poses.iter().filter(|pose| !self.marked.contains(&pose.revision))
+    }
+
+    /// Number of scans that were accepted and not undone, whether their poses are kept or not.
+    pub fn scans(&self) -> u64 {
+        self.len() as u64 + self.thinned
+    }
+
+    /// Number of those scans whose poses are not kept.
+    pub fn thinned(&self) -> u64 {
+        self.thinned
     }
 
     /// Number of poses.
@@ -212,6 +224,11 @@ impl Trajectory {
         self
     }
 
+    /// This trajectory, with so many further scans that were accepted and whose poses are not kept.
+    pub fn with_thinned(self, scans: u64) -> Self {
+        Self { thinned: self.thinned.saturating_add(scans), ..self }
+    }
+
     /// Takes back the changes that made the revisions `changes`, at `revision`: the scans among them, which ascend, go.
     pub(in crate::map) fn withdraw(&mut self, changes: impl Iterator<Item = u64>, revision: u64) {
         let changes: Vec<_> = changes.map(|change| WithdrawnChange { change, revision }).collect();
@@ -223,10 +240,15 @@ impl Trajectory {
     }
 
     /// Thins the poses of scans that made a revision before `before`, which no undo may reach; the number of poses that
-    /// went. The ids of their scans stay known. `withdrawn` loses what was taken out before that.
+    /// went. The ids of their scans stay known, and their number does. `withdrawn` loses what was taken out before
+    /// that.
     pub fn thin(&mut self, before: u64, spacing: &TrajectorySpacing) -> usize {
         let mut gone = Vec::new();
-        for (name, revisions) in self.unjudged(before) {
+        let unjudged = match spacing.keep {
+            KeptPoses::Spaced => self.unjudged(before),
+            KeptPoses::All => Vec::new(),
+        };
+        for (name, revisions) in unjudged {
             let robots = Arc::make_mut(&mut self.robots);
             let Some(robot) = robots.get_mut(&name).map(Arc::make_mut) else { continue };
             let poses = revisions.iter().filter_map(|&revision| self.poses.get(revision));
@@ -235,6 +257,7 @@ impl Trajectory {
             robot.forget(thinned.into_iter());
         }
         let thinned = gone.len();
+        self.thinned += thinned as u64;
         let marked: Vec<u64> = self.marked.range(..before).copied().collect();
         if !marked.is_empty() {
             self.forget_undone(&marked);
@@ -318,6 +341,7 @@ impl PartialEq for Trajectory {
         self.stored().eq(other.stored())
             && self.marked == other.marked
             && self.withdrawn == other.withdrawn
+            && self.thinned == other.thinned
             && self.forgotten().eq(other.forgotten())
     }
 }

@@ -31,4 +31,4 @@ pub use known_scan::{ForgottenIds, KnownScan};
 pub use map_trajectory::Trajectory;
 pub use robot_scans::SESSIONS_PER_ROBOT_MAX;
 pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, ViewpointRecord, WithdrawnChange};
-pub use thinning::TrajectorySpacing;
+pub use thinning::{KeptPoses, TrajectorySpacing};

@@ -70,6 +70,7 @@ fn check(trajectory: &Trajectory, model: &Model, spacing: &TrajectorySpacing) ->
     let kept = model.kept(spacing);
     prop_assert_eq!(trajectory.poses().cloned().collect::<Vec<_>>(), kept.clone());
     prop_assert_eq!(trajectory.len(), kept.len());
+    prop_assert_eq!(trajectory.scans(), model.accepted().count() as u64);
     let withdrawn: Vec<_> = model.withdrawn.iter().filter(|w| w.revision >= model.base).copied().collect();
     prop_assert_eq!(trajectory.withdrawn(), &withdrawn[..]);
     for revision in 0..=model.revision {
@@ -159,12 +160,27 @@ proptest! {
 fn restored(trajectory: &Trajectory) -> Trajectory {
     let forgotten = trajectory.forgotten();
     let empty = forgotten.fold(Trajectory::default(), |all, (robot, ids)| all.with_forgotten(robot, &ids));
-    empty.with_poses(trajectory.stored().cloned(), trajectory.withdrawn().to_vec())
+    let restored = empty.with_poses(trajectory.stored().cloned(), trajectory.withdrawn().to_vec());
+    restored.with_thinned(trajectory.thinned())
 }
 
 fn scan(revision: u64, session: &SessionName, id: u64) -> MappedScan {
     let pose = MappedScan::new(robot(0), Pose::identity());
     MappedScan { revision, session: session.clone(), scan_id: Some(id), ..pose }
+}
+
+#[test]
+fn every_pose_is_kept_where_that_is_wanted_and_what_was_undone_goes_all_the_same() {
+    let all = TrajectorySpacing { keep: KeptPoses::All, ..TrajectorySpacing::default() };
+    let none = SessionName::default();
+    let mut trajectory: Trajectory = (1..=9).map(|revision| scan(revision, &none, revision)).collect();
+    trajectory.withdraw([4].into_iter(), 10);
+    assert_eq!(trajectory.thin(11, &all), 0);
+    assert_eq!((trajectory.len(), trajectory.scans(), trajectory.stored().count()), (8, 8, 8));
+    assert!(trajectory.withdrawn().is_empty());
+    // As soon as it is wanted no more, they are thinned; that they were there stays known.
+    assert_eq!(trajectory.thin(11, &TrajectorySpacing::default()), 5);
+    assert_eq!((trajectory.len(), trajectory.scans(), trajectory.thinned()), (3, 8, 5));
 }
 
 #[test]

@@ -19,10 +19,34 @@ use hashbrown::HashSet;
 
 use super::scan::MappedScan;
 use crate::geometry::Pose;
+use crate::util::Keyword;
+
+/// Which poses are kept once no undo reaches them any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum KeptPoses {
+    /// Those that lie apart by [`TrajectorySpacing`].
+    #[default]
+    Spaced,
+    /// Every pose, which takes memory and space in each snapshot for as long as the map is used.
+    All,
+}
+
+impl Keyword for KeptPoses {
+    const ALL: &'static [Self] = &[Self::Spaced, Self::All];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Spaced => "spaced",
+            Self::All => "all",
+        }
+    }
+}
 
 /// How far poses of one robot lie apart that are kept for good.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrajectorySpacing {
+    /// Whether poses are thinned at all.
+    pub keep: KeptPoses,
     /// Side of the cells of which each keeps a pose, meters. 0.5.
     pub distance_m: f64,
     /// Steps of roll, pitch and yaw of which each keeps a pose in each cell, degrees. 10.
@@ -34,7 +58,7 @@ pub struct TrajectorySpacing {
 
 impl Default for TrajectorySpacing {
     fn default() -> Self {
-        Self { distance_m: 0.5, rotation_deg: 10.0, seconds: 60.0 }
+        Self { keep: KeptPoses::Spaced, distance_m: 0.5, rotation_deg: 10.0, seconds: 60.0 }
     }
 }
 
