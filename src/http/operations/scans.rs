@@ -302,7 +302,7 @@ fn guess_of(
 }
 
 fn covariance_of(rows: &[f64]) -> Result<PoseCovariance, ServiceError> {
-    PoseCovariance::new(rows).in_field("guess")
+    PoseCovariance::new(rows).in_field("guess_covariance")
 }
 
 fn yes() -> bool {

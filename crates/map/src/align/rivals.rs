@@ -156,11 +156,11 @@ impl Contest<'_> {
             );
             return (Verdict::Ambiguous, reason, rivals);
         }
-        if let Some(reason) = ends.reason_against_best(best) {
-            return (Verdict::Contradicted, reason, Vec::new());
-        }
         if let Some(aside) = self.slides_to(best, ends) {
             return (Verdict::Undetermined, format!("{agree}, and as well {aside}"), Vec::new());
+        }
+        if let Some(reason) = ends.reason_against_best(best) {
+            return (Verdict::Contradicted, reason, Vec::new());
         }
         let held_m = best.fit.information.directions()[0].std_m;
         // A search has no guess.

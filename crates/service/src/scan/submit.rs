@@ -131,7 +131,10 @@ impl HostedMap {
         settings: &ServiceSettings,
         stop: StopSignal<'_>,
     ) -> Result<ScanAnswer, ServiceError> {
-        request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
+        request.foreground_level.map_or(Ok(()), |level| self.check_level(level)).map_err(|error| {
+            let message = format!("foreground_level: {}", error.message);
+            ServiceError { message, ..error }
+        })?;
         let scan = FilteredScan::of(request, settings)?;
         let RobotSettings { odometry, mount, .. } = settings.of_robot(&request.robot);
         let mapper = self.mapper(request.method, false, settings).with_odometry(odometry).with_mount(mount);
