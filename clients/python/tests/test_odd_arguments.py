@@ -196,6 +196,8 @@ def test_what_makes_no_client_and_no_map_is_refused(client: mrol.Client, odd: st
     for fields in ({"hashes": value, "bits_per_key": 10.0}, {"hashes": 3, "bits_per_key": value}):
         must_be_named(lambda fields=fields: client.map("odd", 0.1, filter=mrol.FilterSettings(**fields)), "filter", odd)  # type: ignore[misc]
     must_be_named(lambda: client.delete_map(value), "name", odd)
+    must_be_named(lambda: client.rename_map(value, "odd"), "name", odd)
+    must_be_named(lambda: client.rename_map("odd", value), "to", odd)
     must_be_named(lambda: client.with_timeout(value), "timeout_s", odd)
     for of in client.maps().maps:
         if of.name.startswith("odd"):
