@@ -78,10 +78,13 @@ struct Line(JsonEvent);
 
 impl Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let JsonEvent { time_ms, robot, scan_id, duration_ms, answer, error, .. } = &self.0;
+        let JsonEvent { time_ms, robot, session, scan_id, duration_ms, answer, error, .. } = &self.0;
         write!(f, "{} {robot}", timestamp(*time_ms))?;
         if let Some(scan_id) = scan_id {
             write!(f, " scan {scan_id}")?;
+        }
+        if !session.is_empty() {
+            write!(f, " of session {session}")?;
         }
         match (answer, error) {
             (Some(answer), _) => write_answer(f, answer)?,
@@ -102,7 +105,10 @@ fn write_answer(f: &mut fmt::Formatter<'_>, answer: &JsonScan) -> fmt::Result {
     match (answer.accepted, answer.replayed, answer.stationary) {
         (true, true, _) => write!(f, ", was there already"),
         (true, _, true) => write!(f, ", stands still"),
-        (true, ..) => write!(f, ", {} new voxels", count(answer.new_voxels)),
+        (true, ..) => {
+            let (new, revision) = (count(answer.new_voxels), answer.version.revision);
+            write!(f, ", {new} new voxels, revision {revision}")
+        }
         (false, ..) => write!(f, ", {}", answer.reason),
     }
 }

@@ -1,10 +1,13 @@
 //! Settings are loaded from defaults, a file, variables and options.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::Path;
 
 use figment::Figment;
 use figment::providers::{Env, Format, Serialized, Toml};
+use figment::value::Value;
+use mrol_service::EVERY_ROBOT;
 use serde::Serialize;
 
 use super::error::ConfigError;
@@ -37,6 +40,7 @@ impl Config {
         if let Some((old, new)) = RENAMED.into_iter().find(|(old, _)| figment.contains(old)) {
             return Err(ConfigError::Renamed { old, new });
         }
+        let figment = with_every_robot(figment);
         let config: Self = figment.extract().map_err(|e| ConfigError::Value(described(&e)))?;
         let (limits, constants) = config.limits.clone().with_constants();
         Self { limits, constants_set: constants, ..config }.checked()
@@ -53,6 +57,16 @@ fn check_file(path: &Path) -> Result<(), ConfigError> {
         Err(error) => Err(error),
     }
     .map_err(|error| unreadable(error.to_string()))
+}
+
+/// The settings in which the section of each robot has what it leaves out from that of every robot.
+fn with_every_robot(settings: Figment) -> Figment {
+    let Some(mut robots) = settings.find_value("robots").ok().and_then(Value::into_dict) else {
+        return settings;
+    };
+    let Some(every) = robots.remove(EVERY_ROBOT) else { return settings };
+    let sections: BTreeMap<String, Value> = robots.into_keys().map(|name| (name, every.clone())).collect();
+    settings.join(Serialized::defaults(BTreeMap::from([("robots", sections)])))
 }
 
 /// Renamed settings: former name, present name.
@@ -104,6 +118,21 @@ mod tests {
         assert_eq!(config.grpc.listen.to_string(), "127.0.0.1:7334");
         let limits = config.service_settings().limits;
         assert_eq!(limits, Limits { maps_max: 2, ..Limits::default() });
+    }
+
+    #[test]
+    fn what_the_section_of_a_robot_leaves_out_is_as_that_of_every_robot_says() {
+        let toml = "[robots.\"*\"]\nrecover = true\nrange_max_m = 40\n[robots.r1]\nrange_max_m = 20\n\
+                    [robots.\"a.b\"]\nrecover = false";
+        let robots = load(toml, json!({})).unwrap().service_settings().robots;
+        let of = |name: &str| (robots[name].recover, robots[name].filter.range_max_m);
+        assert_eq!(of("*"), (true, Some(40.0)));
+        assert_eq!(of("r1"), (true, Some(20.0)));
+        assert_eq!(of("a.b"), (false, Some(40.0)));
+        // One that is no section is told as before.
+        let error =
+            load("[robots]\nr1 = 3\n[robots.\"*\"]\nrecover = true", json!({})).unwrap_err().to_string();
+        assert!(error.contains("robots.r1"), "{error}");
     }
 
     #[test]

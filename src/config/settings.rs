@@ -61,7 +61,7 @@ pub struct Config {
     pub filter: FilterConfig,
     /// Settings of alignment.
     pub alignment: AlignmentConfig,
-    /// Settings by robot name; `"*"` stands for every other robot.
+    /// Settings by robot name; `"*"` stands for every other robot, and for what the others leave out.
     pub robots: BTreeMap<String, RobotConfig>,
     /// Limits of the server; each is named in the error of a request beyond it.
     pub limits: Limits,

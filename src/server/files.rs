@@ -152,7 +152,8 @@ impl ReloadableFiles {
     fn tell_of_keys(&self) {
         for (key, expires) in self.access.expiring(SystemTime::now(), self.warnings.keys) {
             if self.reminders.is_due(format!("key {key} {expires}"), Instant::now()) {
-                tracing::warn!(%key, %expires, "a key expires: a later `expires` in its table prolongs it");
+                tracing::warn!(%key, %expires, "a secret of a key expires: a later `expires` in its table prolongs it, but for the former one of a key \
+                     that was rotated");
             }
         }
     }

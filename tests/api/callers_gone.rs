@@ -195,14 +195,14 @@ async fn what_takes_too_long_is_ended_and_the_limit_named() {
     daemon.put_in("a", &corner()).await;
     let late = daemon.mapping().await.align_scan(endless()).await.unwrap_err();
     assert_eq!(late.code(), Code::DeadlineExceeded, "{late:?}");
-    assert!(late.message().contains("alignment_time_max allows, which is 200ms"), "{late:?}");
+    assert!(late.message().contains("alignment_time_max_s allows, which is 200ms"), "{late:?}");
     let pb::AlignScanRequest { map, scan, guess, method, .. } = endless();
     let scan = pb::InsertScanRequest { map, scan, guess, method, ..Default::default() };
     let late = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
     assert_eq!(late.code(), Code::DeadlineExceeded, "{late:?}");
-    assert!(late.message().contains("insertion_time_max allows, which is 300ms"), "{late:?}");
+    assert!(late.message().contains("insertion_time_max_s allows, which is 300ms"), "{late:?}");
 
     let late =
         json_of(daemon.post("/v1/maps/a/undo", serde_json::json!({"revision": 1})).await).await.to_string();
-    assert!(late.contains("time_limit") && late.contains("undo_time_max allows, which is 0ns"), "{late}");
+    assert!(late.contains("time_limit") && late.contains("undo_time_max_s allows, which is 0ns"), "{late}");
 }

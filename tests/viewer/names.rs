@@ -36,7 +36,7 @@ async fn what_a_link_a_file_or_an_answer_names_runs_nothing() {
                 if (!answer.headers.get('content-type')?.includes('json')) return answer;
                 const said = await answer.json();
                 for (const map of said.maps ?? []) said.unavailable = [{{ map: hostile, reason: hostile }}];
-                if (said.poses) said.poses = said.poses.map((of) => ({{ ...of, robot: hostile, session: hostile }}));
+                if (Array.isArray(said.poses)) said.poses = said.poses.map((of) => ({{ ...of, robot: hostile, session: hostile }}));
                 if (said.keep_outs) said.keep_outs = [{{ name: hostile, made_by: hostile, sphere: {{ center_m: [0, 0, 0], radius_m: 1 }} }}];
                 const failed = {{ number: 1, time_ms: 0, robot: hostile, session: hostile, points: 1, duration_ms: 1, answer: null,
                                   error: {{ reason: hostile, detail: hostile }} }};

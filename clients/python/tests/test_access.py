@@ -49,7 +49,8 @@ def test_keys_open_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
             (lambda: anonymous.map("a"), mrol.Unauthenticated, "key_missing"),
             (lambda: mrol.connect(server.address, key="wrong").maps(), mrol.Unauthenticated, "key_unknown"),
             (lambda: mrol.connect(server.address, key=reader).map("b"), mrol.PermissionDenied, "map_not_allowed"),
-            (lambda: mrol.connect(server.address, key=reader).map("a", 0.1), mrol.PermissionDenied, "scope_too_small"),
+            (lambda: mrol.connect(server.address, key=reader).map("a", 0.2), mrol.PermissionDenied, "scope_too_small"),
+            (lambda: mrol.connect(server.address, key=robot).map("c", 0.1), mrol.PermissionDenied, "scope_too_small"),
             (
                 lambda: mrol.connect(server.address, key=robot).map("a").insert([[1, 0, 0]]),
                 mrol.PermissionDenied,
@@ -59,10 +60,13 @@ def test_keys_open_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
             with pytest.raises(error) as denied:
                 refused()
             assert denied.value.reason == reason
+        # The lines of the guide, with a key that may not make maps: the map is there.
+        assert mrol.connect(server.address, key=robot).map("a", resolution=0.1, robot="r1").describe().scans == 1
         assert [of.name for of in mrol.connect(server.address, key=reader).maps().maps] == ["a"]
         made = a.keep_out("k", sphere=([0, 0, 0], 1))
         assert a.keep_outs().keep_outs[0].made_by == "admin"
         assert made.revision == 2
+        assert mrol.connect(server.address, key=f"{reader}\n").map("a").describe().scans == 1
         monkeypatch.setenv("MROL_KEY", reader)
         told = mrol.connect(server.address).map("a").describe()
         assert (told.scans, told.poses) == (1, 1)

@@ -19,7 +19,7 @@ pub(crate) struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// The limit `name`, which is so many seconds.
+    /// The limit `limits.NAME_s` of the settings, which is so many seconds.
     pub(crate) fn new(name: &'static str, most_s: f64) -> Self {
         Self { name, most: Duration::from_secs_f64(most_s), ends: Arc::default() }
     }
@@ -58,7 +58,8 @@ impl TimeLimit {
         if error.reason != Reason::TimeLimit {
             return error;
         }
-        let message = format!("the request took longer than {} allows, which is {:?}", self.name, self.most);
+        let message =
+            format!("the request took longer than limits.{}_s allows, which is {:?}", self.name, self.most);
         ServiceError { message, ..error }
     }
 }

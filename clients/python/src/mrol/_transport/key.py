@@ -62,8 +62,11 @@ class Key:
 
 
 def _given(secret: object) -> str | None:
-    if secret is None or (isinstance(secret, str) and _can_be_sent(secret)):
-        return secret
+    """The secret that is given, without the end of the line of a file that it was read from."""
+    if secret is None:
+        return None
+    if isinstance(secret, str) and _can_be_sent(secret.rstrip("\r\n")):
+        return secret.rstrip("\r\n")
     raise ArgumentError("key", "something else", EXPECTED)
 
 

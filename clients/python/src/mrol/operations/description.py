@@ -75,8 +75,9 @@ class MapInfo(Versioned):
     """The levels, finest first."""
     scans: int
     """Scans that were accepted and not undone."""
-    poses: int
-    """Those of them whose poses are kept: a server thins old poses, unless its `store.keep_trajectory` is `all`."""
+    poses: int | None
+    """Those of them whose poses are kept: a server thins old poses, unless its `store.keep_trajectory` is `all`. None of a server
+    that does not tell, from before it counted them."""
     robots: tuple[str, ...]
     sightings: tuple[Sighting, ...]
     asleep: bool
@@ -118,7 +119,7 @@ def map_info(fields: Fields) -> MapInfo:
         origin_m=settings.numbers("origin_m", (3,)) if settings.has("origin_m") else None,
         levels=tuple(_level(of) for of in fields.objects("levels")),
         scans=fields.whole("scans"),
-        poses=fields.whole("poses"),
+        poses=fields.whole("poses") if fields.has("poses") else None,
         robots=fields.texts("robots"),
         sightings=tuple(_sighting(of) for of in fields.objects("sightings")) if fields.has("sightings") else (),
         asleep=fields.flag("asleep"),
