@@ -13,6 +13,8 @@ use mrol::telemetry::{LogFormat, Logging, start_logging};
 
 /// Log level: only problems, since the demonstration itself says what happens.
 const LOG_LEVEL: &str = "warn";
+/// Seconds that a planner's question may take: nobody else waits for its map, and the machine may have other work to do.
+const QUESTION_TIME_MAX_S: f64 = 5.0;
 
 pub(super) struct Daemon {
     daemon: server::Daemon,
@@ -34,6 +36,7 @@ impl Daemon {
         let mut config = Config { data_dir: data_dir.path().to_owned(), ..Config::default() };
         config.http.listen = http.unwrap_or(config.http.listen);
         config.grpc.listen = grpc.unwrap_or(config.grpc.listen);
+        config.limits.question_time_max_s = QUESTION_TIME_MAX_S;
         let (output, is_asked_for) = (output.clone(), move |protocol| match protocol {
             "http" => http.is_some(),
             _ => grpc.is_some(),
