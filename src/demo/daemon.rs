@@ -13,7 +13,7 @@ use mrol::telemetry::{LogFormat, Logging, start_logging};
 
 /// Log level: only problems, since the demonstration itself says what happens.
 const LOG_LEVEL: &str = "warn";
-/// Seconds that a planner's question may take: nobody else waits for its map, and the machine may have other work to do.
+/// Seconds that a planner's question may take: nobody else waits for its map, and the machine may have other work.
 const QUESTION_TIME_MAX_S: f64 = 5.0;
 
 pub(super) struct Daemon {
