@@ -8,12 +8,10 @@ use super::{
     RobotConfig,
 };
 use super::{StoreConfig, ThreadsConfig, TlsConfig};
-use mrol_service::{Limits, Setting, SettingKind, Unit};
+use mrol_service::{EVERY_ROBOT, Limits, Setting, SettingKind, Unit};
 
 /// Characters of a comment's line.
 const COLUMNS: usize = 100;
-/// The section of every robot that has none of its own.
-const EVERY_ROBOT: &str = "*";
 
 /// A section of the settings: its name, empty for those outside of any, and its rows.
 type Section = (&'static str, Vec<Setting>);

@@ -59,7 +59,7 @@ fn check_file(path: &Path) -> Result<(), ConfigError> {
     .map_err(|error| unreadable(error.to_string()))
 }
 
-/// The settings in which the section of each robot has what it leaves out from that of every robot.
+/// Fills what the section of a robot leaves out from the section of every robot.
 fn with_every_robot(settings: Figment) -> Figment {
     let Some(mut robots) = settings.find_value("robots").ok().and_then(Value::into_dict) else {
         return settings;

@@ -179,6 +179,10 @@ async fn what_is_in_front_of_the_map_is_told_point_by_point() {
     let body = json!({"robot": "r", "points": json, "foreground_level": 9});
     let refused = json_of(daemon.post("/v1/maps/a/alignment", body).await).await;
     assert_eq!(refused["reason"], "level_out_of_range", "{refused}");
+    assert!(
+        refused["detail"].as_str().unwrap().starts_with("foreground_level: level must lie in"),
+        "{refused}"
+    );
 }
 
 #[tokio::test]

@@ -93,6 +93,12 @@ fn an_insertion_ends_with_a_code_of_its_own_where_a_scan_is_refused() {
     assert_eq!((&answer["accepted"], &answer["verdict"]), (&json!(false), &json!("low_overlap")));
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: 1 of 1 scans not accepted\n");
     assert_eq!(daemon.call(&[&insert[..6], &["--force"]].concat())[0]["accepted"], true);
+
+    // Each event names what an undo of it takes.
+    let events = mrol(&["events", "--map", "a", "--server", &daemon.0.grpc]).assert().success();
+    let told = String::from_utf8(events.get_output().stdout.clone()).unwrap();
+    let first = told.lines().next().unwrap();
+    assert!(first.contains(" scan 0 of session ") && first.contains(" new voxels, revision 1, "), "{told}");
 }
 
 #[test]

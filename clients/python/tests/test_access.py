@@ -7,6 +7,7 @@ import subprocess
 import threading
 import time
 import traceback
+import urllib.request
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -31,6 +32,16 @@ def certificate(folder: Path, name: str) -> tuple[Path, Path]:
     files = ["-keyout", str(key), "-out", str(pem), "-addext", "basicConstraints=critical,CA:FALSE"]
     subprocess.run(["openssl", "req", "-x509", *options, *files], check=True, capture_output=True)
     return pem, key
+
+
+def test_a_server_that_does_not_tell_how_many_poses_it_keeps_is_understood(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        mrol.connect(server.address).map("m", resolution=0.1)
+        with urllib.request.urlopen(f"http://{server.address}/v1/maps/m") as response:
+            told = json.load(response)
+    assert told.pop("poses") == 0
+    with ScriptedServer(answering(answer(json.dumps(told).encode()))) as server:
+        assert map_of(server).describe().poses is None
 
 
 def test_keys_open_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

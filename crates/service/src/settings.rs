@@ -45,7 +45,7 @@ pub struct ServiceSettings {
     pub alignment: AlignmentSettings,
     /// When a robot counts as standing still.
     pub stationary: StationarySettings,
-    /// Settings of robots by name; the name `*` stands for every other robot.
+    /// Settings of robots by name; the name `*` stands for every robot without an entry.
     pub robots: BTreeMap<String, RobotSettings>,
     /// Filter settings of maps whose makers do not say.
     pub filter: FilterSettings,

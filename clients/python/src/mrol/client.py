@@ -131,8 +131,9 @@ class Client:
         try:
             self._caller.call(Request("PUT", path_of("v1", "maps", found.name), JSON, [given]))
         except PermissionDenied as denied:
-            is_telling_all = filter is None and origin is None
-            if not (denied.reason == "scope_too_small" and is_telling_all and _is_there(found, settings)):
+            # These two are not compared.
+            is_comparable = filter is None and origin is None
+            if not (denied.reason == "scope_too_small" and is_comparable and _is_there(found, settings)):
                 raise
         return found
 
@@ -323,7 +324,7 @@ def _greet(caller: Caller) -> None:
 
 
 def _is_there(found: Map, settings: dict[str, Any]) -> bool:
-    """Whether a map is there with the resolution, the levels and the moments that are given; none is none in particular."""
+    """Whether a map is there with the given resolution, levels and moments; settings that are None are not compared."""
     try:
         info = found.describe()
     except ServerError:

@@ -15,8 +15,8 @@ const RANGE_MAX_M: f32 = 60.0;
 /// the one does not align to the other.
 ///
 /// Both are points in the sensor frame, meters. The scan `before` is a map of its own, with the levels of `settings`;
-/// the sensor is thought to have stood still, or to be off that as `expected` says. What is found is only a guess,
-/// which the map has to confirm.
+/// the guess is that the sensor stood still. `expected` says how far off that may be; without it nothing is known. The
+/// result is only a guess, which the map has to confirm.
 pub(super) fn motion_between(
     before: &[Point],
     now: &[Point],
