@@ -1,4 +1,4 @@
-//! Requesters whose recent long work failed.
+//! Requesters whose recent work failed.
 
 use std::collections::HashMap;
 
@@ -6,24 +6,24 @@ use parking_lot::Mutex;
 
 use super::asker::Requester;
 
-/// Consecutive failures after which a requester's work runs in shorter parts.
+/// Consecutive failures after which a requester's work gives way to that of others.
 const FAILURES_MAX: u32 = 3;
-/// Requesters that are remembered, at most; beyond, the one that failed longest ago is forgotten.
+/// Requesters that are remembered, at most; beyond, the one that was noted longest ago is forgotten.
 const REMEMBERED_MAX: usize = 1024;
 
-/// Requesters whose work failed, with the failures since their last success.
+/// Requesters, with the failures since their last success.
 #[derive(Debug, Default)]
 pub(super) struct Failures(Mutex<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    of: HashMap<Requester, Failed>,
+    of: HashMap<Requester, Noted>,
     noted: u64,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Failed {
-    times: u32,
+struct Noted {
+    failures: u32,
     last: u64,
 }
 
@@ -34,24 +34,23 @@ impl Failures {
         state.noted += 1;
         let last = state.noted;
         for who in [requester.clone(), Requester::from(&requester.asker)] {
-            if succeeded {
-                state.of.remove(&who);
-                continue;
-            }
-            let failed = state.of.entry(who).or_default();
-            *failed = Failed { times: failed.times.saturating_add(1), last };
+            let of = state.of.entry(who).or_default();
+            let failures = if succeeded { 0 } else { of.failures.saturating_add(1) };
+            *of = Noted { failures, last };
         }
         while state.of.len() > REMEMBERED_MAX {
-            let oldest = state.of.iter().min_by_key(|(_, failed)| failed.last).map(|(who, _)| who.clone());
+            let oldest = state.of.iter().min_by_key(|(_, noted)| noted.last).map(|(who, _)| who.clone());
             oldest.and_then(|who| state.of.remove(&who));
         }
     }
 
-    /// True after [`FAILURES_MAX`] consecutive failures of the robot, or of its asker.
+    /// True after [`FAILURES_MAX`] consecutive failures of the robot; or of its asker, unless the robot's last work
+    /// succeeded.
     pub(super) fn is_failing(&self, requester: &Requester) -> bool {
         let state = self.0.lock();
-        let fails = |who: &Requester| state.of.get(who).is_some_and(|failed| failed.times >= FAILURES_MAX);
-        fails(requester) || fails(&Requester::from(&requester.asker))
+        let failures = |who: &Requester| state.of.get(who).map(|noted| noted.failures);
+        let fails = |who: &Requester| failures(who).is_some_and(|failures| failures >= FAILURES_MAX);
+        fails(requester) || failures(requester) != Some(0) && fails(&Requester::from(&requester.asker))
     }
 }
 
@@ -80,6 +79,11 @@ mod tests {
         }
         assert!(failures.is_failing(&robot("bad")));
         assert!(!failures.is_failing(&robot("good")));
+        // Nor where the others of its asker all fail.
+        for _ in 0..FAILURES_MAX {
+            failures.note(&robot("bad"), false);
+        }
+        assert!(failures.is_failing(&robot("new")) && !failures.is_failing(&robot("good")));
     }
 
     #[test]

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
 use super::asker::{Asker, Requester};
+use super::background::Background;
 use super::failures::Failures;
 use super::fair_queue::{FairQueue, HeldThread};
 use super::pause::{PART, PART_OF_FAILING, Pauses};
@@ -48,6 +49,8 @@ pub(crate) struct Lane {
     jobs_waiting_max: usize,
     /// What its jobs take precedence as, over other lanes.
     precedence: Option<Precedence>,
+    /// Where its jobs are such that others are not to wait for.
+    background: Option<Background>,
     counts: Arc<Counts>,
     failures: Failures,
 }
@@ -92,6 +95,7 @@ impl Lane {
             waiting_for_locks: Arc::new(Shares::new(waiting_max)),
             jobs_waiting_max: waiting_max,
             precedence: None,
+            background: None,
             counts: Arc::default(),
             failures: Failures::default(),
         })
@@ -108,6 +112,12 @@ impl Lane {
     pub(super) fn behind(self, precedence: &Precedence, threads: usize) -> Self {
         let queue = self.queue.giving_precedence(precedence.clone(), threads);
         Self { queue, ..self }
+    }
+
+    /// The same lane, whose jobs use the cores that others leave.
+    #[must_use]
+    pub(super) fn in_background(self, background: &Background) -> Self {
+        Self { background: Some(background.clone()), ..self }
     }
 
     /// Waits for `lock`, before which a job makes no sense. Those that wait are as many as jobs may, and of one asker
@@ -179,6 +189,7 @@ impl Lane {
         let span = tracing::Span::current();
         let (threads, queue) = (Arc::downgrade(&self.threads), self.queue.clone());
         let at_work = self.precedence.as_ref().map(Precedence::begin);
+        let in_background = self.background.as_ref().map(Background::begin);
         self.threads.run(move || {
             let FreeThread { thread, part, unanswered } = thread;
             // The lane is gone, and whoever waited with it.
@@ -189,6 +200,8 @@ impl Lane {
                 threads: &threads,
                 part,
                 held: RefCell::new(thread),
+                in_background,
+                part_begun: Cell::new(Instant::now()),
                 paused_for: Cell::default(),
             };
             let caller_gone = || answer.is_closed();
@@ -196,6 +209,7 @@ impl Lane {
             let done = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| job(stop))));
             // A caller that is answered may ask again at once.
             drop(pauses.held);
+            drop(pauses.in_background);
             drop(at_work);
             drop(threads);
             // A panic drops `answer`, which the caller is told; the thread lives on.

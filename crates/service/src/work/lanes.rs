@@ -1,5 +1,6 @@
 //! The lanes, one for each kind of work: what keeps one kind waiting keeps no other.
 
+use super::background::Background;
 use super::lane::{Lane, LaneSettings, LaneUse};
 use super::precedence::Precedence;
 use crate::error::ServiceError;
@@ -33,9 +34,8 @@ pub(crate) struct Lanes {
     pub(crate) messages: Lane,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     pub(crate) mapping: Lane,
-    /// For scans that take long, a second and more each, of robots and keys whose long scans keep failing: robots whose
-    /// scans fit do not wait for them. A scan that takes long now and then stays in `mapping`, and gives way
-    /// there.
+    /// For the scans of robots and keys whose scans keep failing, which take a second and more each: robots whose scans
+    /// fit do not wait for them. A scan that takes long now and then stays in `mapping`, and gives way there.
     pub(crate) long_mapping: Lane,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     pub(crate) alignment: Lane,
@@ -80,6 +80,7 @@ impl Lanes {
             threads => threads,
         };
         let robots = Precedence::default();
+        let background = Background::behind(&robots, cores());
         let long_waiting = waiting.div_ceil(LONG_SHARE);
         let watches = waiting.max(settings.limits.watches_max);
         Ok(Self {
@@ -87,10 +88,11 @@ impl Lanes {
             queries: of("query", query_threads, waiting, PAUSED_MAX)?.behind(&robots, beside_robots),
             messages: of("message", query_threads, MESSAGES_WAITING_MAX, 0)?,
             mapping: of("mapping", mapping_threads, waiting, PAUSED_MAX)?.taking(&robots),
-            long_mapping: of("long_mapping", of_mapping, long_waiting, PAUSED_MAX)?.taking(&robots),
+            long_mapping: of("long_mapping", of_mapping, long_waiting, PAUSED_MAX)?
+                .in_background(&background),
             alignment: of("alignment", settings.alignment_threads, waiting, PAUSED_MAX)?,
             localization: of("localization", localization_threads, waiting, LARGE_PAUSED_MAX)?,
-            recovery: of("recovery", of_searches, long_waiting, LARGE_PAUSED_MAX)?,
+            recovery: of("recovery", of_searches, long_waiting, LARGE_PAUSED_MAX)?.in_background(&background),
             undo: of("undo", ONE_AT_A_TIME, waiting, LARGE_PAUSED_MAX)?,
             map_files: of("map_file", ONE_AT_A_TIME, waiting, LARGE_PAUSED_MAX)?,
             watch: of("watch", ONE_AT_A_TIME, watches, LARGE_PAUSED_MAX)?,

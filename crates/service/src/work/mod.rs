@@ -1,6 +1,7 @@
 //! Threads for work that uses the CPU: lanes, the fair queues before them, and limits of time.
 
 mod asker;
+mod background;
 mod failures;
 mod fair_queue;
 mod lane;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use parking_lot::Mutex;
+use parking_lot::{Condvar, Mutex};
 
 /// Time for which precedence lasts after the work has ended: robots scan several times a second.
 const LINGERS: Duration = Duration::from_secs(1);
@@ -12,7 +12,14 @@ const LINGERS: Duration = Duration::from_secs(1);
 #[derive(Debug, Clone)]
 pub(super) struct Precedence {
     lingers: Duration,
-    state: Arc<Mutex<State>>,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    /// The last job in hand has ended.
+    ended: Condvar,
 }
 
 #[derive(Debug, Default)]
@@ -34,25 +41,39 @@ impl Default for Precedence {
 impl Precedence {
     /// Work that counts for so long after its end.
     pub(super) fn lingering(lingers: Duration) -> Self {
-        Self { lingers, state: Arc::default() }
+        Self { lingers, shared: Arc::default() }
     }
 
     pub(super) fn begin(&self) -> AtWork {
-        self.state.lock().at_work += 1;
+        self.shared.state.lock().at_work += 1;
         AtWork(self.clone())
+    }
+
+    /// Jobs in hand.
+    pub(super) fn at_work(&self) -> usize {
+        self.shared.state.lock().at_work
+    }
+
+    /// Waits until no job is in hand, for so long at most.
+    pub(super) fn wait_while_at_work(&self, at_most: Duration) {
+        let mut state = self.shared.state.lock();
+        self.shared.ended.wait_while_for(&mut state, |state| state.at_work > 0, at_most);
     }
 
     /// True while a job is in hand, and a while after the last.
     pub(super) fn is_taken(&self) -> bool {
-        let state = self.state.lock();
+        let state = self.shared.state.lock();
         state.at_work > 0 || state.last_end.is_some_and(|end| end.elapsed() < self.lingers)
     }
 }
 
 impl Drop for AtWork {
     fn drop(&mut self) {
-        let mut state = self.0.state.lock();
+        let mut state = self.0.shared.state.lock();
         state.at_work -= 1;
         state.last_end = Some(Instant::now());
+        if state.at_work == 0 {
+            self.0.shared.ended.notify_all();
+        }
     }
 }

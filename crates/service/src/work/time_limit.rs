@@ -90,7 +90,11 @@ mod tests {
         let limit = TimeLimit::new("alignment_time_max", 0.0);
         let error = limit.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
         assert_eq!(error.reason, Reason::TimeLimit);
-        assert!(error.message.contains("limits.alignment_time_max_s allows, which is 0ns"), "{}", error.message);
+        assert!(
+            error.message.contains("limits.alignment_time_max_s allows, which is 0ns"),
+            "{}",
+            error.message
+        );
         let gone = || true;
         let error = limit.run(StopSignal::when(&gone), check_not_stopped).unwrap_err();
         assert_eq!(error.reason, Reason::CallerGone);

@@ -44,3 +44,37 @@ pub(super) fn motion_between(
     };
     (is_found && !stop.is_stopped()).then_some(found.map_from_sensor)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a lidar sees in a corridor 3 m wide, which has no end, with people 2 m away at these azimuths: the same
+    /// wherever along it the lidar is.
+    fn in_corridor(people_deg: &[f32]) -> Vec<Point> {
+        let rays = (0..32).flat_map(|ring| (0..720).map(move |column| (ring, column)));
+        let seen = |(ring, column): (u8, u16)| {
+            let (elevation_deg, azimuth_deg) = (f32::from(ring) - 15.5, f32::from(column) * 0.5 - 180.0);
+            let ((up, out), (left, ahead)) =
+                (elevation_deg.to_radians().sin_cos(), azimuth_deg.to_radians().sin_cos());
+            let direction = [out * ahead, out * left, up];
+            let is_person = people_deg.iter().any(|at| (azimuth_deg - at).abs() < 6.0);
+            let to_wall = 1.5 / direction[1].abs();
+            let to_floor = if up < 0.0 { -1.0 / up } else { f32::INFINITY };
+            let range = to_wall.min(to_floor).min(if is_person { 2.0 } else { 25.0 });
+            (range < 25.0).then(|| Point::from(direction.map(|part| part * range)))
+        };
+        rays.filter_map(seen).collect()
+    }
+
+    #[test]
+    fn a_motion_that_rays_do_not_hold_along_a_corridor_counts_for_nothing() {
+        let (settings, alignment) = (MapSettings::new(0.1, 4), AlignmentSettings::default());
+        let motion = |before: &[f32], now: &[f32]| {
+            let (before, now) = (in_corridor(before), in_corridor(now));
+            motion_between(&before, &now, None, &settings, &alignment, StopSignal::NEVER)
+        };
+        assert_eq!(motion(&[60.0], &[20.0]), None);
+        assert_eq!(motion(&[60.0, -160.0, -20.0], &[20.0, 160.0, -60.0]), None);
+    }
+}

@@ -280,13 +280,6 @@ impl State {
     }
 }
 
-impl HeldThread {
-    /// How long the thread is held by now.
-    pub(in crate::work) fn held_for(&self) -> Duration {
-        self.since.elapsed()
-    }
-}
-
 impl Drop for HeldThread {
     fn drop(&mut self) {
         if let Some(requester) = self.whose.take() {
