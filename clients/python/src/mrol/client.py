@@ -21,6 +21,7 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.protocol import right_address
 from ._transport.request import JSON, Request, path_of, target_of
+from ._transport.stop import OpenStreams
 from ._transport.tls import tls_context
 from .errors import (
     ArgumentError,
@@ -75,7 +76,8 @@ class Health:
 class Client:
     """A server: `mrol.connect` makes one. Threads may share it, and so may processes that fork.
 
-    Used as a context manager, or closed by `close`, it closes the connections that it keeps; it opens others if it is used again.
+    Used as a context manager, or closed by `close`, it ends its watches and closes the connections that it keeps; it opens others
+    if it is used again.
     """
 
     def __init__(self, caller: Caller) -> None:
@@ -202,13 +204,16 @@ class Client:
         return str(self._caller.call(Request("GET", "/metrics")).body, "utf-8", "replace")
 
     def with_timeout(self, timeout_s: float) -> "Client":
-        """The same server, of which each call may take so many seconds, tries and waits included."""
-        client = Client(self._caller.with_timeout(timeout_s))
+        """The same server, of which each call may take so many seconds, tries and waits included.
+
+        Its watches end with this client, and those of this client do not end with it.
+        """
+        client = Client(self._caller.with_timeout(timeout_s, OpenStreams(self._caller.streams)))
         client._sessions = self._sessions
         return client
 
     def close(self) -> None:
-        """Closes the connections that are kept."""
+        """Ends the watches, without an error in the threads that iterate them, and closes the connections that are kept."""
         self._caller.close()
 
     def __enter__(self) -> "Client":

@@ -1,6 +1,6 @@
 """The changes of a map, as they become durable."""
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import replace
 
@@ -11,6 +11,7 @@ from .._protobuf import Message
 from .._transport.caller import Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
+from .._transport.stop import Stop
 from ..errors import ArgumentError, excerpt
 from ..progress import Progress, Told, checked_progress, progress_of
 from ..shapes import BoxLike, OrientedBox
@@ -19,6 +20,7 @@ from .following import SILENCE_MAX_S, following
 from .framing import failure_of, next_message
 from .handle import MapHandle
 from .region import region_parameters
+from .stream import Watch
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
 
 
@@ -35,8 +37,8 @@ class WatchOperations(MapHandle):
         heartbeats: bool = False,
         progress: Progress = None,
         silence_max_s: float = SILENCE_MAX_S,
-    ) -> Iterator[WatchEvent]:
-        """Tells of the map's changes as they become durable, for as long as it is iterated.
+    ) -> Watch[WatchEvent]:
+        """Tells of the map's changes as they become durable, for as long as it is iterated and not closed.
 
         First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
         change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
@@ -69,7 +71,8 @@ class WatchOperations(MapHandle):
         wants_heartbeats = flag_of(heartbeats, "heartbeats")
         silent_s = seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
-        return self._events(parameters, version, wants_heartbeats, checked_progress(progress), silent_s)
+        told = checked_progress(progress)
+        return Watch(self._caller, lambda stop: self._events(parameters, version, wants_heartbeats, told, silent_s, stop=stop))
 
     def _events(
         self,
@@ -78,12 +81,14 @@ class WatchOperations(MapHandle):
         heartbeats: bool,
         progress: Progress,
         silent_s: float,
-    ) -> Iterator[WatchEvent]:
+        *,
+        stop: Stop,
+    ) -> Generator[WatchEvent, None, None]:
         def connect() -> Generator[WatchEvent, None, None]:
             request = Request("GET", self._target("watch", **parameters, **_since(version)))
-            return _told(self._caller, request, silent_s, told)
+            return _told(self._caller, request, silent_s, told, stop)
 
-        with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect)) as events:
+        with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect, stop)) as events:
             for event in events:
                 # A heartbeat has no content hash: that of the revision that it confirms still holds.
                 if isinstance(event, Heartbeat) and version is not None and _is_at(event.version, version):
@@ -110,10 +115,10 @@ def _digits(hash_: int | None) -> str | None:
     return None if hash_ is None else f"{hash_:016x}"
 
 
-def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
+def _told(caller: Caller, request: Request, silent_s: float, told: Told, stop: Stop) -> Generator[WatchEvent, None, None]:
     """The events of one connection, until it ends by an error."""
     states, changes, state_bytes, change_bytes = StateParts(), ChangeParts(), 0, 0
-    with caller.stream(request) as body:
+    with caller.stream(request, stop) as body:
         while True:
             data = next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
             with reading("a message of the watch"):
