@@ -120,7 +120,7 @@ def test_a_client_of_another_time_ends_its_own_watches_alone(client: mrol.Client
 def test_the_thread_that_iterates_closes_a_watch(empty: mrol.Map, begin: "Callable[[mrol.Map], mrol.Watch[Any]]") -> None:
     before = len(os.listdir("/proc/self/fd"))
     with begin(empty) as events:
-        assert len(list(zip(events, range(1), strict=False))) == 1
+        assert next(events) is not None
     assert list(events) == []
     assert len(os.listdir("/proc/self/fd")) <= before + 1
     for event in (events := begin(empty)):

@@ -1,5 +1,7 @@
 """What became of the scans that robots sent."""
 
+from __future__ import annotations
+
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
@@ -74,7 +76,7 @@ class EventOperations(MapHandle):
     """The last answers to robots."""
 
     def events(self, *, robot: str | None = None, since_number: int = 0) -> tuple[ScanEvent, ...]:
-        """What became of the last scans, the oldest first: of all robots or of one, those after an event's number.
+        """What became of the last scans, the oldest first: of all robots or of one `robot`, those after the event `since_number`.
 
         The server keeps them in memory, so many a map (`events_per_map_max`); a restart forgets them.
         """
@@ -86,7 +88,8 @@ class EventOperations(MapHandle):
     ) -> Watch[ScanEvent]:
         """The same, then each as it comes, for as long as it is iterated and not closed.
 
-        It comes back after a lost connection, and where a restored map takes the place of this one.
+        `robot` and `since_number` choose as of `events`. A server that says nothing for `silence_max_s`, no heartbeat either,
+        counts as lost. It comes back after a lost connection, and where a restored map takes the place of this one.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.

@@ -1,5 +1,7 @@
 """The changes of a map, as they become durable."""
 
+from __future__ import annotations
+
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import replace
@@ -41,14 +43,14 @@ class WatchOperations(MapHandle):
         """Tells of the map's changes as they become durable, for as long as it is iterated and not closed.
 
         First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
-        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
-        where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
-        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The hashes of
-        `since` go along: where the map had others at that revision, since an older data folder was put back, a
-        `WatchedState` comes first. The version of an answer has the hash of voxels alone, that of an event the hash of
-        keep-outs and viewpoints too. `box` leaves other voxels out. With `heartbeats` it also tells that nothing has changed
-        (`Heartbeat`). `progress` is told of the bytes of
-        the state; what it raises ends the watch.
+        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was; where
+        that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are the
+        finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The hashes of `since` go
+        along: where the map had others at that revision, since an older data folder was put back, a `WatchedState` comes first.
+        The version of an answer has the hash of voxels alone, that of an event the hash of keep-outs and viewpoints too. `box`
+        leaves other voxels out. With `viewpoints` it tells the viewpoints of scans too, by which a copy knows what is free. With
+        `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of the state; what it
+        raises ends the watch. A server that says nothing for `silence_max_s`, no heartbeat either, counts as lost.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.
