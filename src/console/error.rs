@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use crate::server::ServerError;
 use mrol_client::ClientError;
 use mrol_map::scan::ReadError;
+use mrol_service::Reason;
 use mrol_store::StoreError;
 
 /// A command that did not succeed.
@@ -84,6 +85,9 @@ impl From<ClientError> for CliError {
     fn from(error: ClientError) -> Self {
         match error {
             ClientError::Url { .. } | ClientError::Credentials(_) => Self::usage(error),
+            _ if error.reason() == Some(Reason::KeyMissing.as_str()) => Self::failed(format!(
+                "{error}; --key-file FILE or MROL_KEY_FILE names a file with the secret of one"
+            )),
             _ => Self::failed(error),
         }
     }

@@ -15,7 +15,6 @@ mod serving;
 pub mod statistics;
 mod survey;
 pub mod truth;
-mod units;
 
 pub use map_report::{MapReport, bytes, count, percent};
 pub use statistics::Statistics;

@@ -6,10 +6,9 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use super::error::CliError;
 use super::output::Output;
-use super::units::doubt_meters;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapOrigin;
-use mrol_map::scan::{Columns, PointFilter, read_exact_points_by};
+use mrol_map::scan::{Columns, PointFilter, UnitDoubt, read_exact_points_by};
 
 /// Coordinates are too coarse where rounding them to f32 moves a point by more than this share of a voxel.
 const ROUNDING_SHARE: f64 = 1.0 / 16.0;
@@ -90,7 +89,8 @@ impl Survey {
     pub fn note_unit(&self, file: &Path, first: &[Point3<f64>], output: &Output) {
         // Points that are shifted are those of a survey, whose ranges say nothing.
         if self.shift == Vector3::zeros() {
-            doubt_meters(&file.display().to_string(), first).into_iter().for_each(|doubt| output.note(doubt));
+            let doubt = UnitDoubt::of(first.iter().copied());
+            doubt.into_iter().for_each(|doubt| output.note(format!("{}: {doubt}", file.display())));
         }
     }
 

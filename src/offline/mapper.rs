@@ -7,8 +7,8 @@ use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
 use mrol_map::mapping::{
-    Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper,
-    SensorMount, Sightings,
+    CarvingSettings, Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan,
+    ScanMapper, SensorMount, Sightings,
 };
 use mrol_map::util::StopSignal;
 use mrol_map::visibility::{SensorModel, SensorRays};
@@ -34,6 +34,8 @@ pub struct Mapped {
     pub alignment: Alignment,
     /// Number of finest voxels that the scan added.
     pub new_voxels: usize,
+    /// Number of finest voxels that the scan carved.
+    pub carved_voxels: usize,
     /// Number of finest voxels after the scan.
     pub voxels: usize,
     /// False positive rate of the filters while the scan was aligned.
@@ -78,6 +80,13 @@ impl Mapper {
     #[must_use]
     pub fn recovering(self, recovers: bool) -> Self {
         Self { recovers, ..self }
+    }
+
+    /// This mapper, whose scans carve what they see through if `carves`.
+    #[must_use]
+    pub fn carving(mut self, carves: bool) -> Self {
+        self.settings.carving = carves.then(CarvingSettings::default);
+        self
     }
 
     /// This mapper, for scans of a sensor that is mounted so.
@@ -130,6 +139,7 @@ impl Mapper {
         Ok(Mapped {
             beyond_map: points.iter().filter(|&&point| from_points.index(point).is_none()).count(),
             new_voxels: outcome.committed.map_or(0, |committed| committed.added),
+            carved_voxels: outcome.committed.map_or(0, |committed| committed.removed),
             voxels: self.map.voxels(0),
             false_positive_rate,
             align_time: outcome.located.align_time,

@@ -52,6 +52,32 @@ async fn a_constant_velocity_goes_on_as_the_last_two_scans_went() {
 }
 
 #[tokio::test]
+async fn points_that_seem_to_be_in_millimeters_are_told_where_a_scan_is_refused_or_the_first_one() {
+    let daemon = Daemon::start().await;
+    let insert = async |map: &str, points: &[[f32; 3]], more: &str| {
+        let route = format!("/v1/maps/{map}/scans?robot=r{more}");
+        let answer = json_of(daemon.post_bytes(&route, bytes_of(points)).await).await;
+        (answer["accepted"].as_bool().unwrap(), answer["reason"].as_str().unwrap().to_owned())
+    };
+    let millimeters: Vec<_> = corner().into_iter().map(|point| point.map(|c| 1000.0 * c)).collect();
+    daemon.make_map("a").await;
+    let (accepted, reason) = insert("a", &millimeters, "").await;
+    let expected = "the first scan of the map; the median range of its points is";
+    assert!(accepted && reason.starts_with(expected), "{reason}");
+    assert!(reason.contains("are they in millimeters?"), "{reason}");
+    let (accepted, reason) = insert("a", &millimeters, "&align=false").await;
+    assert!(accepted && !reason.contains("millimeters"), "{reason}");
+
+    daemon.make_map("b").await;
+    for more in ["", "&align=false"] {
+        let (accepted, reason) = insert("b", &corner(), more).await;
+        assert!(accepted && !reason.contains("millimeters"), "{reason}");
+    }
+    let (accepted, reason) = insert("b", &millimeters, "").await;
+    assert!(!accepted && reason.contains("are they in millimeters?"), "{reason}");
+}
+
+#[tokio::test]
 async fn points_out_of_range_or_of_the_robots_body_do_not_count() {
     let daemon = Daemon::start_with(|config| {
         let far = RobotConfig { range_max_m: Some(5.0), ..RobotConfig::default() };

@@ -57,6 +57,35 @@ async fn a_robot_that_starts_again_counts_from_0_in_another_session() {
 }
 
 #[tokio::test]
+async fn an_undo_of_an_id_of_another_session_names_the_sessions_that_have_it() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    for (session, points) in [("", 3), ("boot-1", 4), ("boot-2", 5)] {
+        assert_eq!(insert(&daemon, session, 7, points).await.0, StatusCode::OK);
+    }
+    let undo = async |session: &str, id: u64| {
+        let undo = json!({"robot": "r", "session": session, "scan_id": id});
+        json_of(daemon.post("/v1/maps/a/undo", undo).await).await
+    };
+    let said = async |session: &str, id: u64| {
+        let refused = undo(session, id).await;
+        assert_eq!(refused["reason"], "scan_not_found", "{refused}");
+        refused["detail"].as_str().unwrap().to_owned()
+    };
+    let other = said("boot-3", 7).await;
+    assert!(other.ends_with("in other sessions: boot-2, boot-1, the empty one"), "{other}");
+    assert!(said("boot-3", 8).await.ends_with("scan_id 8 of session boot-3 of robot r"));
+    // What was undone cannot be undone, in whichever session.
+    assert_eq!(undo("", 7).await["scans"], 1);
+    assert_eq!(undo("boot-2", 7).await["scans"], 1);
+    let other = said("", 7).await;
+    assert!(
+        other.ends_with("scan_id 7 of robot r; the robot has one of this id in another session: boot-1"),
+        "{other}"
+    );
+}
+
+#[tokio::test]
 async fn the_id_of_an_undone_scan_stays_known() {
     let daemon = Daemon::start_with(|config| config.store.undo_revisions = 3).await;
     daemon.make_map("a").await;

@@ -5,6 +5,7 @@ use mrol::scan::read_trajectory;
 use mrol::store::{Disk, Snapshot};
 use serde_json::json;
 
+use super::support::box_in_room::room;
 use super::{Sequence, complaint, mrol, objects};
 
 const SCANS: usize = 4;
@@ -40,7 +41,8 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
         assert!(line["reason"].as_str().is_some_and(|reason| !reason.is_empty()));
         assert_eq!(line["information"].as_array().unwrap().len(), 6);
         assert!(line["points_skipped"].is_u64());
-        assert_eq!(line.as_object().unwrap().len(), 15);
+        assert_eq!(line["carved_voxels"], 0);
+        assert_eq!(line.as_object().unwrap().len(), 16);
     }
     let added: u64 = lines.iter().map(|line| line["new_voxels"].as_u64().unwrap()).sum();
     assert_eq!(lines[SCANS - 1]["voxels"].as_u64().unwrap(), added);
@@ -201,6 +203,31 @@ fn poses_put_scans_where_truth_with_at_truth_puts_them() {
     };
     assert_eq!(map(&["--poses", &truth]), map(&["--truth", &truth, "--at-truth"]));
     complaint(&["map", &scans, "--resolution", "0.05", "--poses", &truth, "--truth", &truth], 2);
+}
+
+#[test]
+fn scans_carve_what_they_see_through_where_they_are_told_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let files = ["1.xyz", "2.xyz"].map(path);
+    for (file, has_box) in files.iter().zip([true, false]) {
+        let lines = room(has_box).into_iter().map(|[x, y, z]| format!("{x} {y} {z}\n"));
+        std::fs::write(file, lines.collect::<String>()).unwrap();
+    }
+    let poses = path("poses.txt");
+    std::fs::write(&poses, "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").unwrap();
+    let map = |options: &[&str]| {
+        let files = files.each_ref().map(String::as_str);
+        // A room looks the same turned around, so that its poses have to be told.
+        objects(&[&["map", "--resolution", "0.1", "--poses", &poses], &files[..], options].concat())
+    };
+    let carved = |options: &[&str]| map(options)[1]["carved_voxels"].as_u64().unwrap();
+    assert_eq!((carved(&[]), carved(&["--carve=false"])), (0, 0));
+    let (grown, carved) = (map(&[]), map(&["--carve"]));
+    let (count, voxels) =
+        (carved[1]["carved_voxels"].as_u64().unwrap(), carved[1]["voxels"].as_u64().unwrap());
+    assert!(count > 50, "{count}");
+    assert_eq!(grown[1]["voxels"].as_u64().unwrap(), voxels + count);
 }
 
 #[test]

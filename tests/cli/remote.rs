@@ -52,7 +52,10 @@ fn a_map_is_made_listed_described_and_deleted() {
     let back = mrol(&["maps", "rename", "b", "a", "--server", &daemon.0.grpc]).assert().success();
     let line = String::from_utf8(back.get_output().stdout.clone()).unwrap();
     assert!(line.starts_with("map b is called a now: voxels of 0.05 m, 3 levels, uuid "), "{line}");
+    // Without a terminal nobody is asked.
     assert_eq!(daemon.call(&["maps", "delete", "a"]), [json!({"deleted": "a"})]);
+    daemon.call(&["maps", "create", "a", "--resolution", "0.1"]);
+    assert_eq!(daemon.call(&["maps", "delete", "a", "--yes"]), [json!({"deleted": "a"})]);
     assert!(daemon.refuses(&["maps", "show", "a"]).contains("map a does not exist"));
     assert_eq!(daemon.stop(), Some(0));
 }

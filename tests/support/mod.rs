@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 #![allow(unreachable_pub, reason = "a test has no crate to reach it from")]
 
+pub mod box_in_room;
 pub mod daemon;
 pub mod description;
 pub mod disk;

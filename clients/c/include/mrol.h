@@ -788,6 +788,11 @@ mrol_code mrol_client_close(mrol_client client, mrol_error *error);
  * settings. Errors: MROL_REFUSED (map_exists: with others; bad_settings, ...). */
 mrol_code mrol_client_create_map(mrol_client client, const char *map, double resolution_m, uint32_t levels, mrol_error *error);
 
+/* Gives a map the name `to`, which no map has; its uuid, its revision and its robots stay. Watches and replicas under the former name
+ * end. Errors: MROL_REFUSED (map_not_found; map_exists: a map is called `to`; bad_name). After MROL_TIMEOUT and MROL_UNREACHABLE look
+ * which of the two names is there: the same call again could rename a map that somebody has made meanwhile. */
+mrol_code mrol_client_rename_map(mrol_client client, const char *map, const char *to, mrol_error *error);
+
 /* mrol_replica_query_points of the server's map. */
 mrol_code mrol_client_query_points(mrol_client client, const char *map, const mrol_point_query *query, uint8_t *occupied,
                                    size_t occupied_bytes, mrol_answer *answer, mrol_error *error);

@@ -78,6 +78,25 @@ pub unsafe extern "C" fn mrol_client_create_map(
     })
 }
 
+/// Gives a map another name: `mrol_client_rename_map` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_rename_map(
+    client: ClientHandle,
+    map: *const c_char,
+    to: *const c_char,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let error = unsafe { Out::of(error, "error") };
+    guarded(error, || {
+        let (client, map, to) = (CLIENTS.get(client)?, name_of(map)?, named(to, "to")?);
+        client.call(|client| client.rename_map(&map, &to)).map(drop)
+    })
+}
+
 /// Asks a server about points: `mrol_client_query_points` of mrol.h.
 ///
 /// # Safety
@@ -203,5 +222,10 @@ unsafe fn answered<Q: memory::Question, A: Copy>(
 }
 
 fn name_of(map: *const c_char) -> Result<MapName, Failure> {
-    Ok(MapName::new(&required(map, "map")?).map_err(ServiceError::from)?)
+    named(map, "map")
+}
+
+/// The name of a map, which errors call `argument`.
+fn named(name: *const c_char, argument: &str) -> Result<MapName, Failure> {
+    Ok(MapName::new(&required(name, argument)?).map_err(ServiceError::from)?)
 }

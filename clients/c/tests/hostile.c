@@ -510,6 +510,10 @@ static void bad_calls(const char *address, const char *map) {
     MUST(mrol_client_query_points(client, map, &query, &bits, 1, NULL, NULL) == MROL_OK);
     FAILS(mrol_client_create_map(client, "m", NAN, 3, &error), MROL_REFUSED, "resolution_m");
     FAILS(mrol_client_create_map(client, "m", 0.1, UINT32_MAX, &error), MROL_REFUSED, "levels");
+    FAILS(mrol_client_rename_map(client, "nowhere", "m", &error), MROL_REFUSED, "nowhere");
+    FAILS(mrol_client_rename_map(client, map, map, &error), MROL_REFUSED, map);
+    FAILS(mrol_client_rename_map(client, NULL, "m", &error), MROL_INVALID_ARGUMENT, "map");
+    FAILS(mrol_client_rename_map(client, map, NULL, &error), MROL_INVALID_ARGUMENT, "to");
     MUST(mrol_client_close(client, NULL) == MROL_OK);
     FAILS(mrol_client_close(client, &error), MROL_CLOSED, "not open");
     FAILS(mrol_client_align_scan(client, map, &scan, &answer, &error), MROL_CLOSED, "not open");

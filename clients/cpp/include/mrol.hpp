@@ -541,6 +541,11 @@ public:
         mrol_error failed;
         detail::check(mrol_client_create_map(handle_, detail::c_text(map, "map"), resolution_m, levels, &failed), failed);
     }
+    // Gives a map another name, which no map has.
+    void rename_map(const std::string &map, const std::string &to) const {
+        mrol_error failed;
+        detail::check(mrol_client_rename_map(handle_, detail::c_text(map, "map"), detail::c_text(to, "to"), &failed), failed);
+    }
     // Aligns a scan and, where it fits, adds it: then it is durable.
     scan_answer insert(const std::string &map, const scan &taken) const {
         return scan_call(mrol_client_insert_scan, map, taken);

@@ -45,6 +45,13 @@ int main(int count, char **words) {
     client.create_map(map, 0.1, 4);
     EXPECT(thrown([&] { client.create_map(map, 0.2, 4); }) == "map_exists");
     EXPECT(thrown([&] { client.create_map("../x", 0.2); }) == "bad_name");
+    client.rename_map(map, map + "-1");
+    EXPECT(thrown([&] { client.rename_map(map, map + "-3"); }) == "map_not_found");
+    client.create_map(map, 0.2, 4);
+    EXPECT(thrown([&] { client.rename_map(map + "-1", map); }) == "map_exists");
+    EXPECT(thrown([&] { client.rename_map(map, "../x"); }) == "bad_name");
+    client.rename_map(map, map + "-4");
+    client.rename_map(map + "-1", map);
     EXPECT(thrown([&] { client.create_map(map + "-2", -1); }) == "bad_settings");
 
     // A wall of 41 x 31 voxels at x = 2, and a floor beside it, seen from the origin.

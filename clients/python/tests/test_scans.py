@@ -194,3 +194,10 @@ def test_after_the_last_id_there_is_an_error_that_says_what_to_do(client: mrol.C
     # Other robots go on.
     assert empty.insert([[5, 0, 0]], align=False, guess=np.eye(4), force=True, robot="other").scan_id == 1
     assert len(empty.trajectory()) == 5
+
+
+def test_points_in_millimeters_are_told_in_the_reason_of_a_refused_scan(hall: mrol.Map) -> None:
+    refused = hall.insert(room() * 1000, guess=np.eye(4))
+    assert not refused.accepted
+    assert "are they in millimeters?" in refused.reason
+    assert "millimeters" not in hall.insert(room((0.2, 0, 0), seed=3), guess=np.eye(4)).reason

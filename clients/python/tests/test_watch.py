@@ -63,7 +63,7 @@ def test_a_watch_tells_the_state_and_then_each_change(empty: mrol.Map) -> None:
     assert isinstance(cause_of_removal, mrol.WatchedKeepOut)
     assert (cause_of_removal.name, cause_of_removal.put) == ("l", None)
     assert following.__name__
-    events.close()  # type: ignore[attr-defined]
+    events.close()
 
 
 def test_a_watch_goes_on_from_a_version(empty: mrol.Map) -> None:

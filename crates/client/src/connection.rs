@@ -1,5 +1,7 @@
 //! The client's connection: address, limits and flow-control windows.
 
+use std::error::Error;
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -32,10 +34,23 @@ type Keyed = InterceptedService<Channel, ShownKey>;
 
 impl Connection {
     pub(super) async fn open(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
+        Self::open_within(url, credentials, CONNECT_TIMEOUT).await
+    }
+
+    async fn open_within(
+        url: &str,
+        credentials: &Credentials,
+        timeout: Duration,
+    ) -> Result<Self, ClientError> {
         let (url, endpoint) = endpoint(url, credentials)?;
-        match endpoint.connect().await {
-            Ok(channel) => Ok(Self { channel, key: credentials.key(), url: url.into() }),
-            Err(error) => Err(ClientError::unreachable(url, &error)),
+        let connecting = endpoint.connect_timeout(timeout);
+        match tokio::time::timeout(timeout, connecting.connect()).await {
+            Ok(Ok(channel)) => Ok(Self { channel, key: credentials.key(), url: url.into() }),
+            Ok(Err(error)) if !is_timeout(&error) => Err(ClientError::unreachable(url, &error)),
+            Ok(Err(_)) | Err(_) => {
+                let cause = format!("no answer within {} s", timeout.as_secs_f64());
+                Err(ClientError::Unreachable { url, cause })
+            }
         }
     }
 
@@ -83,6 +98,13 @@ impl Connection {
     }
 }
 
+/// True of an error that comes of the time which connecting may take.
+fn is_timeout(error: &(dyn Error + 'static)) -> bool {
+    let is_one = error.is::<tokio::time::error::Elapsed>()
+        || error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::TimedOut);
+    is_one || error.source().is_some_and(is_timeout)
+}
+
 /// Parses `url`; returns it in full, with the endpoint to connect to.
 fn endpoint(url: &str, credentials: &Credentials) -> Result<(String, Endpoint), ClientError> {
     let refused = |problem: &str| ClientError::Url { url: url.to_owned(), problem: problem.to_owned() };
@@ -101,7 +123,6 @@ fn endpoint(url: &str, credentials: &Credentials) -> Result<(String, Endpoint), 
     let endpoint = Endpoint::from_shared(full.clone()).map_err(|error| refused(&error.to_string()))?;
     let endpoint = if is_secure { secured(endpoint, credentials)? } else { endpoint };
     let endpoint = endpoint
-        .connect_timeout(CONNECT_TIMEOUT)
         .tcp_nodelay(true)
         .http2_keep_alive_interval(transport::KEEPALIVE_INTERVAL)
         .keep_alive_timeout(transport::KEEPALIVE_TIMEOUT)
@@ -140,6 +161,27 @@ mod tests {
             let error = endpoint(bad, &Credentials::default()).unwrap_err().to_string();
             assert!(error.starts_with(&format!("{bad:?} is no server address")), "{error}");
         }
+    }
+
+    #[tokio::test]
+    async fn a_server_that_does_not_take_the_connection_is_named_with_how_long_was_tried() {
+        // Once the queue of a listener that accepts nothing is full, nobody answers a connection.
+        let socket = tokio::net::TcpSocket::new_v4().unwrap();
+        socket.bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let listener = socket.listen(1).unwrap();
+        let address = listener.local_addr().unwrap();
+        let mut waiting = Vec::new();
+        for _ in 0..4 {
+            let connecting = tokio::net::TcpStream::connect(address);
+            waiting.push(tokio::time::timeout(Duration::from_millis(200), connecting).await);
+        }
+        assert!(waiting.iter().any(Result::is_err), "the queue is not full");
+        let (none, patience) = (Credentials::default(), Duration::from_millis(500));
+        let error = Connection::open_within(&address.to_string(), &none, patience).await.unwrap_err();
+        let expected = format!(
+            "cannot connect to http://{address}: no answer within 0.5 s; is `mrol serve` running there?"
+        );
+        assert_eq!(error.to_string(), expected);
     }
 
     #[tokio::test]

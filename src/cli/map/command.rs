@@ -37,6 +37,7 @@ EXAMPLES:
                                                              are the filters ample? (last line)
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
                                                              a map for queries, in a small part of the memory
+  mrol map scans/ --resolution 0.1 --carve --out office.mrol     without those who walked by
   mrol map utm/*.pcd --resolution 0.1 --origin auto --out site.mrol     scans in the coordinates of a survey
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
@@ -96,6 +97,9 @@ pub(crate) struct Map {
     /// searched for in the whole map, where the next scan has to confirm the place
     #[arg(long)]
     no_recovery: bool,
+    /// Take out of the map what the scans saw through: people who walked by, what was moved [default: maps only grow]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
+    carve: Option<bool>,
     /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one
     /// before it
     #[arg(long, value_enum, default_value_t)]
@@ -146,7 +150,8 @@ impl Map {
         let (survey, origin) = self.survey(&files, &output)?;
         let settings = MapSettings { origin, ..self.map_settings() };
         let mapper = Mapper::new(settings, alignment, self.guess.into())?;
-        let mapper = mapper.recovering(!self.no_recovery).mounted(self.mount());
+        let mapper = mapper.recovering(!self.no_recovery).carving(self.carve == Some(true));
+        let mapper = mapper.mounted(self.mount());
         let mut mapper = mapper.with_sensor(self.points.sensor());
         if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
             output.note(format!("origin of the map: {x} {y} {z}"));

@@ -28,6 +28,7 @@ pub(super) struct ScanLine {
     information: [[f64; 6]; 6],
     iterations: u32,
     new_voxels: usize,
+    carved_voxels: usize,
     voxels: usize,
     points_skipped: usize,
     #[serde(skip)]
@@ -66,6 +67,7 @@ impl ScanLine {
             information: mapped.alignment.information.rows(),
             iterations: mapped.alignment.iterations,
             new_voxels: mapped.new_voxels,
+            carved_voxels: mapped.carved_voxels,
             voxels: mapped.voxels,
             align_ms: mapped.align_time.as_secs_f64() * 1e3,
             insert_ms: mapped.insert_time.as_secs_f64() * 1e3,
@@ -110,6 +112,9 @@ impl Display for ScanLine {
             true if self.is_mostly_beyond => write!(f, "  {}", self.reason)?,
             true => write!(f, "  {} points skipped", count(self.points_skipped))?,
             false => {}
+        }
+        if self.carved_voxels > 0 {
+            write!(f, "  {} carved", count(self.carved_voxels))?;
         }
         if let Some(how) = self.recovered {
             write!(f, "  recovered: {how}")?;

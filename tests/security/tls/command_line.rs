@@ -53,6 +53,7 @@ fn a_key_is_made_and_used_over_mutual_tls() {
     let create = ["maps", "create", "a", "--resolution", "0.1"];
     let (said, code) = call(&create, &[]);
     assert!(code == Some(1) && said.contains("key_missing"), "{said}");
+    assert!(said.contains("--key-file FILE or MROL_KEY_FILE names a file with the secret"), "{said}");
     let (said, code) = call(&create, &[("MROL_KEY", &reader)]);
     assert!(code == Some(1) && said.contains("scope_too_small"), "{said}");
     let (said, code) = call(&[&create[..], &["--key-file", &path("operator.secret")]].concat(), &[]);

@@ -46,6 +46,7 @@ from .operations.keep_outs import KeepOut, KeepOutChange, KeepOuts
 from .operations.localization import Candidate, Localization
 from .operations.observers import Observers, ObservingScan
 from .operations.scans import OpenDirection, RayAgreement, RayCounts, Rival, ScanAnswer
+from .operations.stream import Watch
 from .operations.trajectory import MappedScan, Trajectory
 from .operations.undo import Undo
 from .operations.voxels import View, Voxels
@@ -153,6 +154,7 @@ __all__ = [
     "Viewpoint",
     "VoxelBlocks",
     "Voxels",
+    "Watch",
     "WatchEvent",
     "WatchedChange",
     "WatchedDeletion",

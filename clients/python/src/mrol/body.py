@@ -1,5 +1,7 @@
 """A robot's body, and where it is asked to be."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Union
@@ -48,7 +50,7 @@ class Body:
         object.__setattr__(self, "links", links)
 
     @classmethod
-    def of(cls, value: "BodyLike") -> "Body":
+    def of(cls, value: BodyLike) -> Body:
         """A `Body`, a `Link`, or the spheres of one link: an array of shape (n, 4)."""
         if isinstance(value, Body):
             return value

@@ -1,5 +1,7 @@
 """A server, and how to reach it."""
 
+from __future__ import annotations
+
 import json
 import os
 import time
@@ -21,6 +23,7 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.protocol import right_address
 from ._transport.request import JSON, Request, path_of, target_of
+from ._transport.stop import OpenStreams
 from ._transport.tls import tls_context
 from .errors import (
     ArgumentError,
@@ -75,7 +78,8 @@ class Health:
 class Client:
     """A server: `mrol.connect` makes one. Threads may share it, and so may processes that fork.
 
-    Used as a context manager, or closed by `close`, it closes the connections that it keeps; it opens others if it is used again.
+    Used as a context manager, or closed by `close`, it ends its watches and closes the connections that it keeps; it opens others
+    if it is used again.
     """
 
     def __init__(self, caller: Caller) -> None:
@@ -103,7 +107,9 @@ class Client:
         origin: ArrayLike | None = None,
         robot: str = ROBOT,
     ) -> Map:
-        """A map: with a `resolution` (the side of a voxel, meters) it is made where it is not there; without, it has to be there.
+        """The map `name`, which is made where it is not there if a `resolution` is given.
+
+        `resolution` is the side of a voxel, meters. Without it the map has to be there.
 
         `levels` (6) halve the resolution each; `filter="none"` and `moments=False` are for maps that are only queried. `robot`
         is the name in which scans are sent: give each robot one of its own. `origin` x y z, meters, says where the map's origin
@@ -147,10 +153,11 @@ class Client:
         )
 
     def rename_map(self, name: str, to: str, *, robot: str = ROBOT) -> Map:
-        """Gives a map another name, which no map has, and returns it; its uuid, its revision and its robots stay.
+        """Gives the map `name` another name, `to`, which no map has, and returns it; its uuid, its revision and its robots stay.
 
-        Watches and changes that are under way under the former name end with `NotFound` (`map_not_found`). It is not sent
-        again where the connection breaks, since somebody may have made a map of the former name meanwhile.
+        `robot` is the name in which scans are sent, as of `map`. Watches and changes that are under way under the former name end
+        with `NotFound` (`map_not_found`). It is not sent again where the connection breaks, since somebody may have made a map of
+        the former name meanwhile.
 
         Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: a map has that name), `InvalidArgument` (`bad_name`).
         """
@@ -160,7 +167,7 @@ class Client:
         return renamed
 
     def delete_map(self, name: str) -> None:
-        """Deletes a map: memory and files are gone.
+        """Deletes the map `name`: memory and files are gone.
 
         It is not sent again where the connection breaks, since somebody may have made a map of that name meanwhile.
 
@@ -179,7 +186,11 @@ class Client:
         progress: Progress = None,
         timeout_s: float = FILE_TIMEOUT_S,
     ) -> Map:
-        """Makes a map of a map file, a path or the bytes of one; see `Map.restore`."""
+        """Makes a map `name` of a map file: `source` is its path, or the bytes of one.
+
+        A map of that name is kept as NAME-replaced-REVISION with `replace`; without, there must be none. `robot` is the name in
+        which scans are sent, as of `map`. `progress` and `timeout_s` are as of `Map.restore`, and so are the errors.
+        """
         made = Map(self._caller, name, robot, self._sessions)
         target = target_of(path_of("v1", "maps", name, "snapshot"), {"replace": flag_of(replace, "replace")})
         restore(self._caller, target, source, progress, timeout_s)
@@ -201,17 +212,20 @@ class Client:
         """The server's metrics, in Prometheus' text form."""
         return str(self._caller.call(Request("GET", "/metrics")).body, "utf-8", "replace")
 
-    def with_timeout(self, timeout_s: float) -> "Client":
-        """The same server, of which each call may take so many seconds, tries and waits included."""
-        client = Client(self._caller.with_timeout(timeout_s))
+    def with_timeout(self, timeout_s: float) -> Client:
+        """The same server, of which each call may take `timeout_s`, tries and waits included.
+
+        Its watches end with this client, and those of this client do not end with it.
+        """
+        client = Client(self._caller.with_timeout(timeout_s, OpenStreams(self._caller.streams)))
         client._sessions = self._sessions
         return client
 
     def close(self) -> None:
-        """Closes the connections that are kept."""
+        """Ends the watches, without an error in the threads that iterate them, and closes the connections that are kept."""
         self._caller.close()
 
-    def __enter__(self) -> "Client":
+    def __enter__(self) -> Client:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -238,7 +252,7 @@ def connect(
     request_bytes_max: int = REQUEST_BYTES_MAX,
     answer_bytes_max: int = ANSWER_BYTES_MAX,
 ) -> Client:
-    """Connects to a server's HTTP: `host:port`, `https://host:port`, or `unix:/path` of a socket.
+    """Connects to a server's HTTP: `address` is `host:port`, `https://host:port`, or `unix:/path` of a socket.
 
     `key` is a secret, `key_file` a file with one, which is read again when the server refuses it: so a key may be rotated under a
     running program. Without either the variables MROL_KEY and MROL_KEY_FILE count, if they are set. `ca` (or MROL_CA) is a file of
@@ -248,7 +262,8 @@ def connect(
     Each call takes `timeout_s` at most, tries, waits and all addresses of the host's name included. It is tried again for
     `patience_s` where the server cannot be reached, starts, drains or is overloaded, and where a connection broke; all changes
     have ids by which the server knows what it has done already. Here alone nothing is tried again unless `wait_s` says how long
-    to wait for the server to be there; the last try may take a second more.
+    to wait for the server to be there; the last try may take a second more. Requests and answers of more than `request_bytes_max`
+    and `answer_bytes_max` bytes are refused.
 
     Files of keys and certificates are regular ones: pipes and devices are refused.
 

@@ -44,11 +44,11 @@ class Map(
     """
 
     def with_timeout(self, timeout_s: float) -> "Map":
-        """The same map, of which each call may take so many seconds, tries and waits included."""
+        """The same map, of which each call may take `timeout_s`, tries and waits included."""
         return Map(self._caller.with_timeout(timeout_s), self._name, self._robot, self._sessions)
 
     def with_robot(self, robot: str) -> "Map":
-        """The same map, to which scans are sent in the name of another robot."""
+        """The same map, to which scans are sent in the name of another `robot`."""
         return Map(self._caller, self._name, robot, self._sessions)
 
     def __reduce__(self) -> "tuple[object, ...]":

@@ -1,5 +1,7 @@
 """Poses: where a frame is in another one."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -39,13 +41,15 @@ class Pose:
         object.__setattr__(self, "rotation_xyzw", rotation)
 
     @classmethod
-    def identity(cls) -> "Pose":
+    def identity(cls) -> Pose:
         """The pose of a frame in itself."""
         return cls.of([0, 0, 0, 0, 0, 0, 1])
 
     @classmethod
-    def of(cls, value: "PoseLike", argument: str = "pose") -> "Pose":
-        """The pose that a value means: a `Pose`, a 4 x 4 matrix, `(t, q)`, or seven numbers.
+    def of(cls, value: PoseLike, argument: str = "pose") -> Pose:
+        """The pose that a `value` means: a `Pose`, a 4 x 4 matrix, `(t, q)`, or seven numbers.
+
+        An error calls it `argument`.
 
         Raises `ArgumentError`, also for what is no rotation: a norm or an angle that is off by more than a thousandth.
         """
@@ -63,7 +67,7 @@ class Pose:
         return matrix
 
     def apply(self, points: ArrayLike) -> F64:
-        """Points of shape (..., 3), carried into the other frame."""
+        """The `points`, of shape (..., 3), carried into the other frame."""
         expected = "points x y z, an array of numbers of shape (..., 3)"
         array = as_numbers(points, "points", expected)
         if array.ndim == 0 or array.shape[-1] != 3:
@@ -72,11 +76,11 @@ class Pose:
             carried: F64 = array.astype(np.float64) @ _rotation_of(self.rotation_xyzw).T + self.translation_m
         return carried
 
-    def inverse(self) -> "Pose":
+    def inverse(self) -> Pose:
         """The way back: of `a_from_b`, `b_from_a`."""
         return Pose.of(np.linalg.inv(self.matrix))
 
-    def __matmul__(self, other: "Pose") -> "Pose":
+    def __matmul__(self, other: Pose) -> Pose:
         """`a_from_b @ b_from_c` is `a_from_c`."""
         if not isinstance(other, Pose):
             raise ArgumentError("the pose on the right", excerpt(other), "a Pose: Pose.of makes one")

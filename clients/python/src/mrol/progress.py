@@ -1,5 +1,7 @@
 """How far long work has come: told to a function, or shown by tqdm where it is installed."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module

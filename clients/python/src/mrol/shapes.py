@@ -1,5 +1,7 @@
 """Parts of space, in the map frame."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -30,7 +32,7 @@ class Box:
         return vector_of(self.min_m, 3, f"{argument}.min_m"), vector_of(self.max_m, 3, f"{argument}.max_m")
 
     @classmethod
-    def of(cls, value: "BoxLike", argument: str = "box") -> "Box":
+    def of(cls, value: BoxLike, argument: str = "box") -> Box:
         """A `Box`, or two corners: an array of shape (2, 3)."""
         if isinstance(value, Box):
             return value

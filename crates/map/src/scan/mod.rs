@@ -7,6 +7,7 @@ mod point_filter;
 mod reader;
 mod skipped;
 mod tum;
+mod unit;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
@@ -16,4 +17,5 @@ pub use reader::{
 };
 pub use skipped::SkippedPoints;
 pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
+pub use unit::UnitDoubt;
 pub use writer::{write_f32, write_pcd, write_ply};

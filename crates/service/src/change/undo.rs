@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tokio::sync::OwnedMutexGuard;
 
 use super::digest::{Digest, FormerDigest};
+use super::robot_known::listed_sessions;
 use crate::commit::{Decided, Refusal, Step, Submission, record_of};
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
@@ -235,7 +236,9 @@ impl HostedMap {
                     Some(KnownScan::Kept(pose)) => vec![pose.revision],
                     Some(KnownScan::TooOld) => return Err(scan_id_too_old(robot, session, *scan_id)),
                     Some(KnownScan::Undone(_)) | None => {
-                        return Err(self.no_scan(&format!("of {}", scan_name(robot, session, *scan_id))));
+                        let others = listed_sessions(&trajectory.sessions_with(robot, *scan_id));
+                        let what = format!("of {}{others}", scan_name(robot, session, *scan_id));
+                        return Err(self.no_scan(&what));
                     }
                 }
             }

@@ -6,7 +6,7 @@ use crate::settings::ServiceSettings;
 use mrol_map::align::PoseCovarianceError;
 use mrol_map::geometry::{Point, rotation_xyzw, translation_m};
 use mrol_map::mapping::{FilteredPoints, Guess, MappingError, RayEnds, Scan};
-use mrol_map::scan::SkippedPoints;
+use mrol_map::scan::{SkippedPoints, UnitDoubt};
 use mrol_map::visibility::{SensorMismatch, SensorModel, SensorModelError, SensorRays};
 use mrol_map::voxel::LatticeFromPoints;
 
@@ -79,6 +79,11 @@ impl<'a> FilteredScan<'a> {
         let surroundings = self.filtered.surroundings().points;
         let beyond_map = surroundings.iter().filter(|&&point| from_points.index(point).is_none()).count();
         SkippedPoints { beyond_map, ..self.filtered.skipped }
+    }
+
+    /// The doubt that its points are in meters, where there is reason to.
+    pub(super) fn unit_doubt(&self) -> Option<UnitDoubt> {
+        UnitDoubt::of(self.request.points.as_slice().iter().map(|point| point.to_f64()))
     }
 
     /// True of a point of the robot's surroundings.

@@ -274,11 +274,19 @@ impl HostedMap {
         let alignment = &located.alignment;
         let skipped = scan.skipped(&self.map.lattice().from_points(&alignment.map_from_sensor));
         let accepted = alignment.verdict == Verdict::Accepted;
-        let reason = skipped.explain(accepted, &alignment.reason);
+        let notes = [
+            scan.sensor_mismatch().map(|mismatch| mismatch.to_string()),
+            (!accepted || self.map.is_empty())
+                .then(|| scan.unit_doubt())
+                .flatten()
+                .map(|doubt| doubt.to_string()),
+        ];
+        let mut reason = skipped.explain(accepted, &alignment.reason);
+        notes.into_iter().flatten().for_each(|note| reason.extend(["; ", &note]));
         ScanAnswer {
             accepted,
             verdict: alignment.verdict,
-            reason: scan.sensor_mismatch().map_or(reason.clone(), |mismatch| format!("{reason}; {mismatch}")),
+            reason,
             map_from_sensor: alignment.map_from_sensor,
             level_overlaps: alignment.level_overlaps.clone(),
             inliers: alignment.inliers,

@@ -1,5 +1,7 @@
 """Scan files by their extensions, and folders of them."""
 
+from __future__ import annotations
+
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -32,7 +34,7 @@ _DIGITS = re.compile(r"([0-9]+)")
 
 
 def read_scan(path: File, columns: ColumnsLike | None = None, *, exact: bool = False) -> F32 | F64:
-    """The points of a scan file, shape (n, 3), in the sensor's frame, meters.
+    """The points of the scan file at a `path`, shape (n, 3), in the sensor's frame, meters.
 
     The extension says the format, in either case: `.ply` (text, binary of either order of bytes), `.pcd` (text, binary,
     binary_compressed), `.xyz`, `.txt` and `.csv` (text: the first three columns, or those that a line of names says), `.npy`
@@ -66,7 +68,7 @@ def read_scan(path: File, columns: ColumnsLike | None = None, *, exact: bool = F
 
 
 def scan_files(folder: File) -> list[Path]:
-    """The scan files of a folder, in the natural order of their names: scan2 before scan10.
+    """The scan files of a `folder`, in the natural order of their names: scan2 before scan10.
 
     They are those that `read_scan` reads, but for `.txt` and `.csv`, which may be lists of poses: read those by their names.
 

@@ -15,6 +15,7 @@ from .key import Key, Secret
 from .pool import Pool
 from .request import Answer, Request
 from .response import Response
+from .stop import OpenStreams, Stop
 
 ERROR_BYTES_MAX = 1 << 20
 """Bytes of an answer that says what is wrong, of one that is read piece by piece otherwise."""
@@ -33,14 +34,17 @@ class Bounds:
 class Caller:
     """Asks one server; threads and forked processes may share it."""
 
-    def __init__(self, pool: Pool, key: Key, bounds: Bounds) -> None:
+    def __init__(self, pool: Pool, key: Key, bounds: Bounds, streams: OpenStreams | None = None) -> None:
         self._pool = pool
         self._key = key
         self.bounds = bounds
+        self.streams = OpenStreams() if streams is None else streams
+        """The watches that `close` ends."""
 
-    def with_timeout(self, timeout_s: float) -> "Caller":
-        """The same caller, over the same connections, with another time for each call."""
-        return Caller(self._pool, self._key, replace(self.bounds, timeout_s=seconds(timeout_s, "timeout_s")))
+    def with_timeout(self, timeout_s: float, streams: OpenStreams | None = None) -> "Caller":
+        """The same caller, over the same connections and with the same streams or others, with another time for each call."""
+        bounds = replace(self.bounds, timeout_s=seconds(timeout_s, "timeout_s"))
+        return Caller(self._pool, self._key, bounds, self.streams if streams is None else streams)
 
     @property
     def address(self) -> str:
@@ -53,7 +57,8 @@ class Caller:
         return self._pool.address
 
     def close(self) -> None:
-        """Closes the connections that are kept."""
+        """Ends the streams, and closes the connections that are kept."""
+        self.streams.close()
         self._pool.close()
 
     def call(self, request: Request, deadline: Deadline | None = None) -> Answer:
@@ -83,14 +88,14 @@ class Caller:
                 return answer
 
     @contextmanager
-    def stream(self, request: Request) -> Iterator["Body"]:
-        """An answer that is read piece by piece, over a connection of its own, which is closed at the end.
+    def stream(self, request: Request, stop: Stop | None = None) -> Iterator["Body"]:
+        """An answer that is read piece by piece, over a connection of its own, which is closed at the end; `stop` ends it before.
 
         Nothing is tried again, but the beginning with another secret: who reads it knows where to go on.
 
         Raises `ConnectionLost` where the server ends it for the sake of its secret, and there is another one now.
         """
-        deadline = Deadline(self.bounds.timeout_s)
+        deadline = Deadline(self.bounds.timeout_s, stop)
         may_renew = True
         while True:
             secret = self._key.secret()

@@ -94,6 +94,7 @@ class Connection:
         # Until an answer was read to its end, wherever Ctrl-C may come.
         self._is_broken = True
         with _Failures(self):
+            deadline.guard(self._socket)
             self._stream.begin(deadline, bytes_max)
             try:
                 self._send(request, secret)
@@ -218,7 +219,7 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
     timeout_s = deadline.remaining_s()
     try:
         if address.socket_path is not None:
-            return _unix(address.socket_path, timeout_s)
+            return _unix(address.socket_path, deadline)
         sock = _tcp(address.host, address.port, deadline)
     except TimeoutError as error:
         raise ConnectFailed(f"cannot connect to {address.shown}: no answer within {timeout_s:.3g} s") from error
@@ -226,8 +227,10 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
         raise ConnectFailed(f"cannot connect to {address.shown}: {error}") from error
     try:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        sock.settimeout(deadline.remaining_s())
-        return sock if tls is None else tls.wrap_socket(sock, server_hostname=address.host)
+        if tls is not None:
+            sock = tls.wrap_socket(sock, server_hostname=address.host, do_handshake_on_connect=False)
+            deadline.guard(sock)
+            sock.do_handshake()
     except (OSError, ValueError) as error:
         sock.close()
         # Its first bytes are no TLS.
@@ -237,6 +240,7 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
     except BaseException:
         sock.close()
         raise
+    return sock
 
 
 def _tcp(host: str, port: int, deadline: Deadline) -> socket.socket:
@@ -254,6 +258,7 @@ def _tcp(host: str, port: int, deadline: Deadline) -> socket.socket:
             failed = error
             continue
         try:
+            deadline.guard(sock)
             sock.settimeout(deadline.remaining_s() / (len(places) - number))
             sock.connect(place)
         except OSError as error:
@@ -267,10 +272,10 @@ def _tcp(host: str, port: int, deadline: Deadline) -> socket.socket:
     raise failed or OSError(f"{host} has no address")
 
 
-def _unix(path: str, timeout_s: float) -> socket.socket:
+def _unix(path: str, deadline: Deadline) -> socket.socket:
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        sock.settimeout(timeout_s)
+        deadline.guard(sock)
         sock.connect(path)
     except BaseException:
         sock.close()

@@ -1,10 +1,12 @@
 """Until when a call may last."""
 
 import math
+import socket
 from time import monotonic
 
 from .._arrays import number_of
 from ..errors import ArgumentError, TimedOut, excerpt
+from .stop import Stop
 
 TIMEOUT_MAX_S = 10 * 365 * 86_400.0
 """The longest time of a call: what is longer is more than the system's timers take."""
@@ -22,12 +24,13 @@ def seconds(value: object, argument: str) -> float:
 
 
 class Deadline:
-    """A moment after which a call does not go on."""
+    """A moment after which a call does not go on; a `stop` may end it before."""
 
-    __slots__ = ("_end", "_timeout_s")
+    __slots__ = ("_end", "_stop", "_timeout_s")
 
-    def __init__(self, timeout_s: float) -> None:
+    def __init__(self, timeout_s: float, stop: Stop | None = None) -> None:
         self._timeout_s = timeout_s
+        self._stop = stop
         self._end = monotonic() + timeout_s
 
     def remaining_s(self) -> float:
@@ -39,6 +42,15 @@ class Deadline:
         if left <= 0:
             raise self.passed()
         return left
+
+    def guard(self, sock: socket.socket) -> None:
+        """Sets the time of what waits on a socket, and lets the stop end it.
+
+        Raises `TimedOut` where none is left, and `ConnectionLost` where it was stopped.
+        """
+        sock.settimeout(self.remaining_s())
+        if self._stop is not None:
+            self._stop.guard(sock)
 
     def passed(self) -> TimedOut:
         """The error that says that the time is up."""

@@ -1,5 +1,7 @@
 """A part of a level as it is stored: masks of blocks of voxels, or the distance field of a box."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,7 +60,9 @@ class BlockOperations(MapHandle):
     """Blocks."""
 
     def block(self, box: BoxLike | OrientedBox | None = None, *, level: int = 0) -> VoxelBlocks:
-        """The occupied voxels of a box, or of all of the level, as masks.
+        """The occupied voxels of a level, 0 the finest, in a `box` (a `Box`, its two corners, or an `OrientedBox`), as masks.
+
+        Without a `box` they are those of all of the `level`.
 
         Raises `ResourceExhausted` (`block_too_large`: ask for a smaller part or a coarser level).
         """
@@ -69,7 +73,10 @@ class BlockOperations(MapHandle):
             return VoxelBlocks(Version.of_headers(answer), whole_header(answer, "mrol-level"), resolution_m, blocks)
 
     def distances(self, box: BoxLike, *, level: int = 0, cap_m: float | None = None) -> DistanceField:
-        """The distance field of a box along the map's axes: a byte a cell. With `cap_m` less has to be looked at.
+        """The distance field of a box along the map's axes: a byte a cell.
+
+        `box` is a `Box`, or its two corners; cells are the voxels of a `level`, 0 the finest. What is `cap_m` away or farther is
+        not told apart, so that less has to be looked at.
 
         Raises `ResourceExhausted` (`block_too_large`), `InvalidArgument` (`bad_cap`, `bad_region`).
         """

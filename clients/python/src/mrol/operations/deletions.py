@@ -1,5 +1,7 @@
 """Voxels taken out of the map."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,7 +54,8 @@ class DeletionOperations(MapHandle):
         lie inside. With a `level` its voxels go, and all within them.
         `not_seen_since` leaves of a region only what no scan after that revision touched although one saw through it.
 
-        Undo it by `undo(deletion)`. After an error with `repeat_with` it is not known whether it was done: repeat it with
+        `request_id` is a name by which the server knows the deletion if it is sent twice; the package gives one. Undo it by
+        `undo(deletion)`. After an error with `repeat_with` it is not known whether it was done: repeat it with
         `**error.repeat_with`.
         """
         of_region = {"box": box, "sphere": sphere, "oriented_box": oriented_box}

@@ -1,5 +1,7 @@
 """What a map is: its settings, its levels, who sent its scans."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 

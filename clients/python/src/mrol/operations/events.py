@@ -1,6 +1,8 @@
 """What became of the scans that robots sent."""
 
-from collections.abc import Generator, Iterator
+from __future__ import annotations
+
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -12,11 +14,13 @@ from .._fields import Fields, fields_of, reading
 from .._transport.caller import Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
+from .._transport.stop import Stop
 from ..errors import server_error
 from ..pose import Pose, pose_in
 from .following import SILENCE_MAX_S, Lines, following
 from .handle import MapHandle
 from .scans import ScanAnswer, answer_in
+from .stream import Watch
 
 STATUS = {
     "unauthenticated": 401,
@@ -72,7 +76,7 @@ class EventOperations(MapHandle):
     """The last answers to robots."""
 
     def events(self, *, robot: str | None = None, since_number: int = 0) -> tuple[ScanEvent, ...]:
-        """What became of the last scans, the oldest first: of all robots or of one, those after an event's number.
+        """What became of the last scans, the oldest first: of all robots or of one `robot`, those after the event `since_number`.
 
         The server keeps them in memory, so many a map (`events_per_map_max`); a restart forgets them.
         """
@@ -81,23 +85,24 @@ class EventOperations(MapHandle):
 
     def watch_events(
         self, *, robot: str | None = None, since_number: int = 0, silence_max_s: float = SILENCE_MAX_S
-    ) -> Iterator[ScanEvent]:
-        """The same, then each as it comes, for as long as it is iterated.
+    ) -> Watch[ScanEvent]:
+        """The same, then each as it comes, for as long as it is iterated and not closed.
 
-        It comes back after a lost connection, and where a restored map takes the place of this one.
+        `robot` and `since_number` choose as of `events`. A server that says nothing for `silence_max_s`, no heartbeat either,
+        counts as lost. It comes back after a lost connection, and where a restored map takes the place of this one.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.
         """
         query, silent_s = _query(robot, since_number), seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
-        return self._follow_events(query, silent_s)
+        return Watch(self._caller, lambda stop: self._follow_events(query, silent_s, stop))
 
-    def _follow_events(self, query: dict[str, Parameter], silent_s: float) -> Iterator[ScanEvent]:
+    def _follow_events(self, query: dict[str, Parameter], silent_s: float, stop: Stop) -> Generator[ScanEvent, None, None]:
         def connect() -> Generator[ScanEvent, None, None]:
-            return _told(self._caller, Request("GET", self._target("events", "watch", **query)), silent_s)
+            return _told(self._caller, Request("GET", self._target("events", "watch", **query)), silent_s, stop)
 
-        with closing(following(self._caller, connect)) as events:
+        with closing(following(self._caller, connect, stop)) as events:
             for event in events:
                 query["since_number"] = event.number
                 yield event
@@ -110,9 +115,9 @@ def _query(robot: str | None, since_number: int) -> dict[str, Parameter]:
     }
 
 
-def _told(caller: Caller, request: Request, silent_s: float) -> Generator[ScanEvent, None, None]:
+def _told(caller: Caller, request: Request, silent_s: float, stop: Stop) -> Generator[ScanEvent, None, None]:
     """The events of one connection, until it ends by an error."""
-    with caller.stream(request) as body:
+    with caller.stream(request, stop) as body:
         lines = Lines(body, caller.bounds.answer_bytes_max)
         while True:
             fields = fields_of(lines.next(Deadline(silent_s)))

@@ -8,6 +8,7 @@ from typing import TypeVar
 from .._transport.attempts import PASSING
 from .._transport.caller import Body, Caller
 from .._transport.deadline import Deadline
+from .._transport.stop import Stop
 from ..errors import BadAnswer, ConnectionLost, MrolError, ServerError, TransportError
 
 PAUSE_S = 0.2
@@ -24,19 +25,22 @@ COMES_BACK = PASSING | {"watch_stalled", "map_replaced"}
 Item = TypeVar("Item")
 
 
-def following(caller: Caller, connect: Callable[[], Generator[Item, None, None]]) -> Generator[Item, None, None]:
+def following(caller: Caller, connect: Callable[[], Generator[Item, None, None]], stop: Stop) -> Generator[Item, None, None]:
     """What connections tell, one after the other: `connect` makes one that goes on where the last one ended.
 
-    It ends by what ends a stream for good, and where the server does not come back within `patience_s`.
+    It ends by what ends a stream for good, and where the server does not come back within `patience_s`; and without an error once
+    it is stopped.
     """
     failing_since: float | None = None
-    while True:
+    while not stop.is_set:
         try:
             with closing(connect()) as items:
                 for item in items:
                     failing_since = None
                     yield item
-        except (ServerError, TransportError) as error:
+        except MrolError as error:
+            if stop.is_set:
+                return
             now = time.monotonic()
             failing_since = now if failing_since is None else failing_since
             if now - failing_since > caller.bounds.patience_s or not _comes_back(error):

@@ -1,5 +1,7 @@
 """Named parts of space where no robot may go."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
@@ -59,10 +61,11 @@ class KeepOutOperations(MapHandle):
         expires_at: datetime | int | None = None,
         request_id: str | None = None,
     ) -> KeepOutChange:
-        """Puts a keep-out in the map, in the place of the one of its name.
+        """Puts a keep-out in the map, in the place of the one of its `name`.
 
-        Give one shape, in the map frame, meters. `expires_at` is a time with a zone, or nanoseconds since 1970, after which the
-        server ends it.
+        Give one shape, in the map frame, meters: a `box` (a `Box` or its two corners), a `sphere` (a `Sphere` or its center and
+        radius), an `oriented_box` or a `prism`. `request_id` is a name by which the server knows the change if it is sent twice;
+        the package gives one. `expires_at` is a time with a zone, or nanoseconds since 1970, after which the server ends it.
 
         Raises `InvalidArgument` (`bad_keep_out`, `bad_expiry`), `ResourceExhausted` (`too_many_keep_outs`).
         """
@@ -83,7 +86,7 @@ class KeepOutOperations(MapHandle):
         return KeepOutChange(Version.of(fields), fields.flag("replayed"))
 
     def remove_keep_out(self, name: str, *, request_id: str | None = None) -> KeepOutChange:
-        """Removes a keep-out.
+        """Removes the keep-out of a `name`; `request_id` is as of `keep_out`.
 
         Raises `NotFound` (`keep_out_not_found`).
         """

@@ -1,5 +1,7 @@
 """Where a scan was taken, without a guess."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -73,7 +75,8 @@ class LocalizationOperations(MapHandle):
 
         `points` has shape (..., 3), meters, in the sensor frame. `gravity_in_sensor` (shape (3,), the direction in which things
         fall, good to 2 degrees) makes the search about ten times as fast; `gravity_in_map` is 0 0 -1 unless it is given.
-        `search_box` bounds where the sensor was. The server searches for 10 s unless `time_limit_s` says otherwise: give the
+        `search_box` bounds where the sensor was. `candidates` is how many places are told at most, and another `seed` draws other
+        points of the scan. The server searches for 10 s unless `time_limit_s` says otherwise: give the
         call more than that (`with_timeout`).
 
         Raises `FailedPrecondition` (`map_empty`), `InvalidArgument`, `ResourceExhausted` (`search_too_large`).

@@ -1,5 +1,7 @@
 """A map as a file, and a map from one."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,13 +33,13 @@ class MapFileOperations(MapHandle):
     """Snapshots and restores."""
 
     def snapshot(self, file: File | None = None, *, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S) -> Version:
-        """Writes the map, at one revision, to a map file.
+        """Writes the map, at one revision, to a map file; it may take `timeout_s`.
 
-        A file of that name is replaced once the new one is whole and on the disk. Its mode, owner and group stay; where this
-        process may not give a file to them, the mode gives nobody more than it gave. A new one has the mode that the umask leaves.
-        Of a symbolic link that is replaced which it leads to.
-        `progress` is told how many bytes of how many are there, or shows a bar (True, where tqdm is installed). What it raises ends
-        the call, and leaves what was there.
+        `file` is its path, NAME.mrol in the current folder without it. A file of that name is replaced once the new one is whole
+        and on the disk. Its mode, owner and group stay; where this process may not give a file to them, the mode gives nobody
+        more than it gave. A new one has the mode that the umask leaves. Of a symbolic link that is replaced which it leads to.
+        `progress` is told how many bytes of how many are there, or shows a bar (True, where tqdm is installed). What it raises
+        ends the call, and leaves what was there.
         """
         path = path_of_file(f"{self._name}.mrol" if file is None else file, "file")
         checked, file_s = checked_progress(progress), seconds(timeout_s, "timeout_s")
@@ -47,8 +49,9 @@ class MapFileOperations(MapHandle):
     def restore(
         self, source: File | bytes, *, replace: bool = True, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S
     ) -> MapInfo:
-        """Makes this map what a map file holds: the path of a regular file, or the bytes of one.
+        """Makes this map what a map file holds: `source` is the path of a regular file, or the bytes of one.
 
+        `progress` is as of `snapshot`; it may take `timeout_s`.
         The map of that name is kept as NAME-replaced-REVISION; with `replace=False` there must be none. It is not sent again where
         the connection breaks: ask the server what is there.
 

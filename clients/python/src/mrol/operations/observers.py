@@ -1,5 +1,7 @@
 """Which scans touched a voxel."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -39,7 +41,9 @@ class ObserverOperations(MapHandle):
     """Observers of a voxel."""
 
     def observers(self, point: ArrayLike | None = None, *, voxel: ArrayLike | None = None, level: int = 0) -> Observers:
-        """The scans that put a point into the voxel at `point` (x y z, meters), or into voxel i j k.
+        """The scans that put a point into the voxel at `point` (x y z, meters), or into `voxel` i j k.
+
+        `level` is that of the voxel, 0 the finest.
 
         Raises `FailedPrecondition` (`no_journal`: the server keeps maps in memory only).
         """

@@ -1,5 +1,7 @@
 """Scans: aligned, and added to the map where they fit."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arguments import flag_of, level_of, text_of, word_of
 from .._arrays import F64, Bools, as_floats, as_numbers, number_of, numbers_text, raw, rows_of, vector_of, whole_of
 from .._fields import Fields, fields_of, reading
+from .._option_docs import documents
 from .._transport.request import Answer, Parameter
 from ..errors import ArgumentError, MrolError, is_outcome_unknown
 from ..pose import Pose, PoseLike, pose_in
@@ -16,6 +19,7 @@ from ..questions.occupancy import POINTS
 from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
 from .handle import MapHandle
+from .scan_options import SCAN_OPTIONS
 
 Method = Literal["refined", "overlap"]
 
@@ -131,6 +135,7 @@ class ScanAnswer(Versioned):
 class ScanOperations(MapHandle):
     """Insertion and alignment of scans."""
 
+    @documents(SCAN_OPTIONS)
     def insert(
         self,
         points: ArrayLike,
@@ -159,12 +164,8 @@ class ScanOperations(MapHandle):
     ) -> ScanAnswer:
         """Aligns a scan and, where it fits, adds it to the map: once, however often it has to be sent.
 
-        `points` has shape (..., 3), meters, in the sensor frame; NaN and infinity mean "no return". `guess` is where the scan is
-        thought to have been taken (`map_from_sensor`), `motion` how far from the robot's last accepted pose (`last_from_sensor`);
-        without either it is that pose. `align=False` adds the scan at its guess. `timestamp_ns` counts from 1970. `point_times`
-        (shape (n,), seconds from `timestamp_ns`) undo the sensor's motion during its sweep. `guess_covariance` has shape (6, 6).
-        `sensor` says how the rays of the sensor lie, "spinning RINGS COLUMNS LOWEST_DEG HIGHEST_DEG" or
-        "pinhole WIDTH HEIGHT FX FY".
+        `points` has shape (..., 3), meters, in the sensor frame; NaN and infinity mean "no return". A pose is a `Pose`, a 4 x 4
+        matrix, `(t, q)` or seven numbers x y z qx qy qz qw.
 
         Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on.
         After an error with `repeat_with` (`ConnectionLost`, `TimedOut`, ...) it is not known whether the scan is in the map: send
@@ -196,6 +197,7 @@ class ScanOperations(MapHandle):
             raise
         return _scan_answer(answer, shape, of_robot, of_session, number)
 
+    @documents(SCAN_OPTIONS)
     def align(
         self,
         points: ArrayLike,
@@ -219,8 +221,7 @@ class ScanOperations(MapHandle):
     ) -> ScanAnswer:
         """What inserting a scan would do; the map stays as it is.
 
-        The arguments are those of `insert`. With `foreground_level` the answer also tells which points fall in no occupied voxel of
-        that level: what is new in the scan.
+        `points` are as of `insert`.
         """
         of_robot = self._robot if robot is None else word_of(robot, "robot")
         parameters: dict[str, Parameter] = {

@@ -1,5 +1,7 @@
 """The poses of accepted scans."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +56,7 @@ class TrajectoryOperations(MapHandle):
     """Trajectories."""
 
     def trajectory(self, *, robot: str | None = None, since_revision: int = 0, limit: int | None = None) -> Trajectory:
-        """The poses of accepted scans: of all robots or of one, after a revision, all or a page of them.
+        """The poses of accepted scans: of all robots or of one `robot`, after `since_revision`, all of them or `limit` at most.
 
         Raises `InvalidArgument` (`page_too_large`).
         """

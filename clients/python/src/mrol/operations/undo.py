@@ -43,8 +43,9 @@ class UndoOperations(MapHandle):
     ) -> Undo:
         """Takes a scan, a deletion, or all scans of a robot since a revision back: the map is then as if they had never come.
 
-        Give what `insert` or `delete` answered; or `robot`, `session` and `scan_id`; or `robot` and `since_revision`; or the
-        `revision` that the change made. It takes a server with a data folder, and reaches back to `storage.undo_from_revision`.
+        Give as `change` what `insert` or `delete` answered; or `robot`, `session` and `scan_id`; or `robot` and `since_revision`;
+        or the `revision` that the change made. `request_id` is a name by which the server knows the undo if it is sent twice; the
+        package gives one. It takes a server with a data folder, and reaches back to `storage.undo_from_revision`.
 
         Raises `NotFound` (`scan_not_found`, `robot_not_found`), `FailedPrecondition` (`outside_undo_window`, `not_undoable`,
         `no_journal`).

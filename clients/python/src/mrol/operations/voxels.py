@@ -1,5 +1,7 @@
 """The occupied voxels of a level."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import dataclass
 from typing import Any
@@ -65,7 +67,8 @@ class VoxelOperations(MapHandle):
     ) -> Voxels:
         """The occupied voxels of a level: all, those with their centers in a box, or those that a camera sees.
 
-        With `keep_out` voxels count whose centers lie in keep-outs.
+        `level` 0 is the finest. `box` is a `Box`, its two corners, or an `OrientedBox`; `view` what a camera sees, a `View`. With
+        `keep_out` voxels count whose centers lie in keep-outs.
 
         Raises `ResourceExhausted` (`listing_too_large`: take a box or a coarser level).
         """
@@ -84,7 +87,7 @@ class VoxelOperations(MapHandle):
         view: View | None = None,
         keep_out: bool = False,
     ) -> int:
-        """How many voxels `voxels` would list; any number is counted."""
+        """How many voxels `voxels` would list by the same `level`, `box`, `view` and `keep_out`; any number is counted."""
         parameters = _listing(level, box, view, keep_out)
         return self._get_fields("voxels", count_only=True, **parameters).whole("voxels_total")
 

@@ -1,6 +1,8 @@
 """The changes of a map, as they become durable."""
 
-from collections.abc import Generator, Iterator
+from __future__ import annotations
+
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import replace
 
@@ -11,6 +13,7 @@ from .._protobuf import Message
 from .._transport.caller import Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
+from .._transport.stop import Stop
 from ..errors import ArgumentError, excerpt
 from ..progress import Progress, Told, checked_progress, progress_of
 from ..shapes import BoxLike, OrientedBox
@@ -19,6 +22,7 @@ from .following import SILENCE_MAX_S, following
 from .framing import failure_of, next_message
 from .handle import MapHandle
 from .region import region_parameters
+from .stream import Watch
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
 
 
@@ -35,18 +39,18 @@ class WatchOperations(MapHandle):
         heartbeats: bool = False,
         progress: Progress = None,
         silence_max_s: float = SILENCE_MAX_S,
-    ) -> Iterator[WatchEvent]:
-        """Tells of the map's changes as they become durable, for as long as it is iterated.
+    ) -> Watch[WatchEvent]:
+        """Tells of the map's changes as they become durable, for as long as it is iterated and not closed.
 
         First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
-        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
-        where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
-        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The hashes of
-        `since` go along: where the map had others at that revision, since an older data folder was put back, a
-        `WatchedState` comes first. The version of an answer has the hash of voxels alone, that of an event the hash of
-        keep-outs and viewpoints too. `box` leaves other voxels out. With `heartbeats` it also tells that nothing has changed
-        (`Heartbeat`). `progress` is told of the bytes of
-        the state; what it raises ends the watch.
+        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was; where
+        that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are the
+        finest voxels as they were recorded; with it, voxels of that level that really appeared and went. The hashes of `since` go
+        along: where the map had others at that revision, since an older data folder was put back, a `WatchedState` comes first.
+        The version of an answer has the hash of voxels alone, that of an event the hash of keep-outs and viewpoints too. `box`
+        leaves other voxels out. With `viewpoints` it tells the viewpoints of scans too, by which a copy knows what is free. With
+        `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of the state; what it
+        raises ends the watch. A server that says nothing for `silence_max_s`, no heartbeat either, counts as lost.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.
@@ -69,7 +73,8 @@ class WatchOperations(MapHandle):
         wants_heartbeats = flag_of(heartbeats, "heartbeats")
         silent_s = seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
-        return self._events(parameters, version, wants_heartbeats, checked_progress(progress), silent_s)
+        told = checked_progress(progress)
+        return Watch(self._caller, lambda stop: self._events(parameters, version, wants_heartbeats, told, silent_s, stop=stop))
 
     def _events(
         self,
@@ -78,12 +83,14 @@ class WatchOperations(MapHandle):
         heartbeats: bool,
         progress: Progress,
         silent_s: float,
-    ) -> Iterator[WatchEvent]:
+        *,
+        stop: Stop,
+    ) -> Generator[WatchEvent, None, None]:
         def connect() -> Generator[WatchEvent, None, None]:
             request = Request("GET", self._target("watch", **parameters, **_since(version)))
-            return _told(self._caller, request, silent_s, told)
+            return _told(self._caller, request, silent_s, told, stop)
 
-        with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect)) as events:
+        with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect, stop)) as events:
             for event in events:
                 # A heartbeat has no content hash: that of the revision that it confirms still holds.
                 if isinstance(event, Heartbeat) and version is not None and _is_at(event.version, version):
@@ -110,10 +117,10 @@ def _digits(hash_: int | None) -> str | None:
     return None if hash_ is None else f"{hash_:016x}"
 
 
-def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
+def _told(caller: Caller, request: Request, silent_s: float, told: Told, stop: Stop) -> Generator[WatchEvent, None, None]:
     """The events of one connection, until it ends by an error."""
     states, changes, state_bytes, change_bytes = StateParts(), ChangeParts(), 0, 0
-    with caller.stream(request) as body:
+    with caller.stream(request, stop) as body:
         while True:
             data = next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
             with reading("a message of the watch"):

@@ -1,5 +1,7 @@
 """The map from above, of a whole site."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -50,9 +52,11 @@ class WholeGridOperations(MapHandle):
         cell_m: float | None = None,
         tell_unknown: bool = False,
         progress: Progress = None,
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> WholeGrid:
         """The map from above as `grid` has it, of a whole site: joined of tiles, which the server draws one after the other.
+
+        `area`, `min_z_m`, `max_z_m`, `band_from`, `cell_m` and `tell_unknown` are as of `grid`.
 
         Where the map changes meanwhile tiles are of different revisions, which `version` and `first_version` tell. `progress` is
         told of the tiles; what it raises ends it.
@@ -62,7 +66,9 @@ class WholeGridOperations(MapHandle):
         more than `answer_bytes_max`.
         """
         fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown=tell_unknown)
-        request = Request("POST", self._target("grid", "tiles"), BYTES, body_of_question({**fields, **QUESTION.checked(scope)}))
+        request = Request(
+            "POST", self._target("grid", "tiles"), BYTES, body_of_question({**fields, **QUESTION.checked(scope, "whole_grid")})
+        )
         bounds, joined = self._caller.bounds, _Tiles(self._caller.bounds.answer_bytes_max)
         with progress_of(checked_progress(progress), self._name, None) as told, self._caller.stream(request) as body:
             while not joined.are_all:

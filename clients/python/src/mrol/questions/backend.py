@@ -1,5 +1,7 @@
 """What answers questions: a server, or a map inside this process. Arguments come checked, and answers are arrays."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
@@ -37,7 +39,7 @@ class Answer(ABC):
             raise BadAnswer(f"{name} of the answer is {told}, where {count} were asked about")
 
     @abstractmethod
-    def bits(self, name: str, count: int, set_bits: "int | None" = None) -> Bools:
+    def bits(self, name: str, count: int, set_bits: int | None = None) -> Bools:
         """An array of booleans; where it is known how many are true, so many are."""
 
     @abstractmethod
@@ -68,11 +70,11 @@ class Backend(ABC):
     """Bytes of an array of a question, at most."""
 
     @abstractmethod
-    def query(self, points: F32, how: PointQuery, scope: Scope, deadline: "Deadline | None") -> tuple[Version, Bools, int]:
+    def query(self, points: F32, how: PointQuery, scope: Scope, deadline: Deadline | None) -> tuple[Version, Bools, int]:
         """Whether points lie in occupied voxels: the version of the map, a boolean for each point, and how many are true."""
 
     @abstractmethod
-    def ask(self, question: str, fields: Mapping[str, Any], scope: Scope, deadline: "Deadline | None" = None) -> Answer:
+    def ask(self, question: str, fields: Mapping[str, Any], scope: Scope, deadline: Deadline | None = None) -> Answer:
         """Answers any other question, by its name and its fields; fields that are None are not given."""
 
     @abstractmethod
@@ -80,5 +82,5 @@ class Backend(ABC):
         """A body, as a field of a question."""
 
     @abstractmethod
-    def deadline(self) -> "Deadline | None":
+    def deadline(self) -> Deadline | None:
         """Until when a question that begins now may last, where it is told."""

@@ -1,5 +1,7 @@
 """Whether a body fits at poses, and whether spheres meet anything."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -88,11 +90,11 @@ class CheckQuestions(QuestionGroup):
         clearance_max_m: float | None = None,
         ignored: Sequence[Shape] = (),
         unknown: Unknown = "free",
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Collisions:
         """Whether a body fits at each of many configurations.
 
-        `body` is a `Body`, or the spheres x y z r of one link, shape (n, 4). Configurations are poses of its links in the map
+        `body` is a `Body`, or the spheres x y z r of one link, shape (n, 4). `configurations` are poses of its links in the map
         frame: shape (..., 4, 4), (..., 7) or, for a body that does not turn, (..., 3); with an axis for the links where there
         are several. `answer="first_hit"` tells what is met, `"clearance"` how far the nearest obstacle is, up to
         `clearance_max_m` (64 voxels at most). Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With
@@ -112,12 +114,12 @@ class CheckQuestions(QuestionGroup):
         }
         given = rows if len(rows) else stand_in_poses(links)
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Collisions:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Collisions:
             of_part = given[part.start * links : part.stop * links]
             told = self._backend.ask("poses", {"configurations": of_part, **fields}, options, deadline)
             return _collisions(told, answer, len(of_part) // links)
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(rows) // links, rows.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "check_poses"), len(rows) // links, rows.nbytes, shape)
 
     @QUESTION.documented
     def check_spheres(
@@ -130,12 +132,12 @@ class CheckQuestions(QuestionGroup):
         clearance_max_m: float | None = None,
         ignored: Sequence[Shape] = (),
         unknown: Unknown = "free",
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Collisions:
-        """Whether spheres meet anything: x y z r in the map frame, meters, shape (..., 4).
+        """Whether `spheres` meet anything: x y z r in the map frame, meters, shape (..., 4).
 
-        With `sizes` (shape (g,)) they are g groups of so many spheres each, and there is an answer for each group. The other
-        arguments are those of `check_poses`.
+        With `sizes` (shape (g,)) they are g groups of so many spheres each, and there is an answer for each group. `padding_m` is
+        added to all radii. `answer`, `clearance_max_m`, `ignored` and `unknown` are as of `check_poses`.
         """
         rows, shape = self._rows(spheres, 4, "spheres", "spheres x y z r, shape (..., 4)")
         counts = np.ones(len(rows), np.dtype("<u4"))
@@ -151,7 +153,7 @@ class CheckQuestions(QuestionGroup):
         }
         given, sizes_given = (rows, counts) if len(counts) else (A_SPHERE, ONE)
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Collisions:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Collisions:
             of_part, sizes_of_part = rows_of_groups(given, sizes_given, part), sizes_given[part]
             count = len(sizes_of_part)
             if not len(of_part):
@@ -162,7 +164,7 @@ class CheckQuestions(QuestionGroup):
             found = _collisions(told, answer, len(sizes_of_part))
             return found if len(sizes_of_part) == count else beginning_of(found, count)
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(counts), rows.nbytes + counts.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "check_spheres"), len(counts), rows.nbytes + counts.nbytes, shape)
 
 
 def stand_in_poses(count: int) -> F32:

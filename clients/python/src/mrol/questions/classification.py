@@ -1,5 +1,7 @@
 """What is known of points: occupied, free, or neither."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,7 +39,7 @@ class ClassificationQuestions(QuestionGroup):
     """Classification of points."""
 
     @QUESTION.documented
-    def classify(self, points: ArrayLike, **scope: "Unpack[QuestionScope]") -> Classification:
+    def classify(self, points: ArrayLike, **scope: Unpack[QuestionScope]) -> Classification:
         """Whether points are occupied, free or unknown, by voxels of a level.
 
         `points` has shape (..., 3), meters, in the map frame.
@@ -48,11 +50,11 @@ class ClassificationQuestions(QuestionGroup):
         rows, shape = self._rows(points, 3, "points", POINTS)
         given = rows if len(rows) else STAND_IN
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Classification:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Classification:
             of_part = given[part]
             answer = self._backend.ask("classification", {"points": of_part}, options, deadline)
             count = len(of_part)
             answer.check_count("points", count)
             return Classification(answer.version, answer.bits("occupied", count), answer.bits("free", count))
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(rows), rows.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "classify"), len(rows), rows.nbytes, shape)

@@ -1,5 +1,7 @@
 """Where free space ends and nothing is known beyond."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -62,7 +64,7 @@ class FrontierQuestions(QuestionGroup):
         size_min: int | None = None,
         frontiers_max: int | None = None,
         standoff_m: float | None = None,
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Frontiers:
         """Free voxels beside unknown ones in a box, in clusters of `size_min` (8) voxels or more, `frontiers_max` (100) of them.
 
@@ -81,7 +83,7 @@ class FrontierQuestions(QuestionGroup):
             "frontiers_max": None if frontiers_max is None else whole_of(frontiers_max, "frontiers_max", 0, (1 << 32) - 1),
             "standoff_m": None if standoff_m is None else number_of(standoff_m, "standoff_m"),
         }
-        answer = self._backend.ask("frontiers", fields, QUESTION.checked(scope))
+        answer = self._backend.ask("frontiers", fields, QUESTION.checked(scope, "frontiers"))
         head = answer.head
         frontiers = tuple(_frontier(of) for of in head.objects("frontiers"))
         return Frontiers(answer.version, frontiers, head.whole("frontiers_total"), head.whole("voxels_total"))

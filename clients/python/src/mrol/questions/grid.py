@@ -1,5 +1,7 @@
 """The map from above."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -63,7 +65,7 @@ class GridQuestions(QuestionGroup):
         band_from: BandFrom = "floor",
         cell_m: float | None = None,
         tell_unknown: bool = False,
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Grid:
         """The map from above: a cell is occupied where a voxel in it reaches between `min_z_m` and `max_z_m`.
 
@@ -77,7 +79,7 @@ class GridQuestions(QuestionGroup):
         `InvalidArgument` (`bad_grid`, `point_out_of_range`), `FailedPrecondition` (`no_floor`).
         """
         fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown=tell_unknown)
-        answer = self._backend.ask("grid", fields, QUESTION.checked(scope))
+        answer = self._backend.ask("grid", fields, QUESTION.checked(scope, "grid"))
         with reading("size"):
             width, height = (int(of) for of in answer.head.numbers("size", (2,)))
             if width < 0 or height < 0:

@@ -1,5 +1,7 @@
 """What the questions of all modules use."""
 
+from __future__ import annotations
+
 from numpy.typing import ArrayLike
 
 from .._arrays import F32, Shape, rows_of

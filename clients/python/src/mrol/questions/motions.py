@@ -1,5 +1,7 @@
 """Whether a body can move along configurations."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,16 +52,17 @@ class MotionQuestions(QuestionGroup):
         clearance_max_m: float | None = None,
         ignored: Sequence[Shape] = (),
         unknown: Unknown = "free",
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Motions:
         """Whether a body fits all along each of many motions.
 
-        Configurations are as of `check_poses`, and the last axis of their shape runs along each motion: an array of shape
-        (m, 2, 7) is m edges of one link. Motions of unequal lengths are one array of all configurations with `lengths`, shape (m,).
-        Between two configurations a link moves along a line and turns the shorter way. The body is checked so often that no
-        point of it moves by more than half a voxel, or by `step_m`, from one check to the next. `clearance_max_m` asks for the
-        least distance to an obstacle as well. The other arguments are those of `check_poses`.
-        More than are taken at once are asked about in parts (see `query`).
+        `body` and `configurations` are as of `check_poses`, and the last axis of their shape runs along each motion: an array of
+        shape (m, 2, 7) is m edges of one link. Motions of unequal lengths are one array of all configurations with `lengths`,
+        shape (m,). Between two configurations a link moves along a line and turns the shorter way. The body is checked so often
+        that no point of it moves by more than half a voxel, or by `step_m`, from one check to the next. `clearance_max_m` asks
+        for the least distance to an obstacle as well. Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With
+        `unknown="occupied"` voxels are met that no scan saw through. More than are taken at once are asked about in parts (see
+        `query`).
         """
         checked = Body.of(body)
         links = len(checked.links)
@@ -73,7 +76,7 @@ class MotionQuestions(QuestionGroup):
         }
         given, lengths_given = (rows, counts) if len(counts) else (stand_in_poses(2 * links), 2 * ONE)
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Motions:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Motions:
             of_part = lengths_given[part]
             of_motions = {"configurations": rows_of_groups(given, lengths_given, part, links), "lengths": of_part}
             answer = self._backend.ask("motions", {**of_motions, **fields}, options, deadline)
@@ -82,7 +85,7 @@ class MotionQuestions(QuestionGroup):
             clearances_m = answer.floats("clearances_m", count) if answer.head.has("clearances_m") else None
             return Motions(answer.version, answer.bits("free", count, free), free, answer.finite("first_hits", count), clearances_m)
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(counts), rows.nbytes + counts.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "check_motions"), len(counts), rows.nbytes + counts.nbytes, shape)
 
 
 def lengths_of(lead: tuple[int, ...], lengths: ArrayLike | None) -> tuple[U32, tuple[int, ...]]:

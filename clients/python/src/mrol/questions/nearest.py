@@ -1,5 +1,7 @@
 """The nearest occupied voxel."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -48,11 +50,12 @@ class NearestQuestions(QuestionGroup):
         radius_m: float,
         *,
         to: MeasuredTo = "cubes",
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Nearest:
         """The occupied voxel or the keep-out nearest to each point, within `radius_m` (64 voxels of the level at most).
 
-        `points` has shape (..., 3), meters, in the map frame. Distances are to the cubes of voxels, or to their centers.
+        `points` has shape (..., 3), meters, in the map frame. Distances are to the cubes of voxels, or with
+        `to="centers"` to their centers.
         More than are taken at once are asked about in parts (see `query`).
 
         Raises `InvalidArgument` (`bad_radius`, `point_not_finite`, `point_out_of_range`).
@@ -61,7 +64,7 @@ class NearestQuestions(QuestionGroup):
         fields = {"radius_m": number_of(radius_m, "radius_m"), "to": choice_of(to, "to", ENDS)}
         given = rows if len(rows) else STAND_IN
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Nearest:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Nearest:
             of_part = given[part]
             answer = self._backend.ask("nearest", {"points": of_part, **fields}, options, deadline)
             count = len(of_part)
@@ -75,4 +78,4 @@ class NearestQuestions(QuestionGroup):
                 answer.names("keep_outs", count),
             )
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(rows), rows.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "nearest"), len(rows), rows.nbytes, shape)

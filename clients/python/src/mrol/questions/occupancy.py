@@ -1,5 +1,7 @@
 """Whether points lie in occupied voxels."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -49,7 +51,7 @@ class OccupancyQuestions(QuestionGroup):
         map_from_points: PoseLike | None = None,
         lookup: Lookup = "exact",
         keep_out: bool = False,
-        **scope: "Unpack[LookupScope]",
+        **scope: Unpack[LookupScope],
     ) -> Occupancy:
         """Whether points lie in occupied voxels.
 
@@ -68,7 +70,7 @@ class OccupancyQuestions(QuestionGroup):
         how = pose, choice_of(lookup, "lookup", LOOKUPS), flag_of(keep_out, "keep_out")
         given = rows if len(rows) else STAND_IN
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Occupancy:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Occupancy:
             return Occupancy(*self._backend.query(given[part], how, options, deadline))
 
-        return self._in_parts(ask, LOOKUP.checked(scope), len(rows), rows.nbytes, shape)
+        return self._in_parts(ask, LOOKUP.checked(scope, "query"), len(rows), rows.nbytes, shape)

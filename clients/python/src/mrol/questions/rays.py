@@ -1,5 +1,7 @@
 """What rays meet first."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -51,7 +53,7 @@ class RayQuestions(QuestionGroup):
         range_m: float | None = None,
         ends: ArrayLike | None = None,
         unknown: Unknown = "free",
-        **scope: "Unpack[QuestionScope]",
+        **scope: Unpack[QuestionScope],
     ) -> Rays:
         """What each ray meets first: from origins along unit vectors, up to `range_m`, or to `ends`.
 
@@ -78,7 +80,7 @@ class RayQuestions(QuestionGroup):
         # Where there is no ray one along x from the origin stands in.
         given, begins = (rows, starts) if len(rows) else (AHEAD, STAND_IN)
 
-        def ask(part: slice, options: Scope, deadline: "Deadline | None") -> Rays:
+        def ask(part: slice, options: Scope, deadline: Deadline | None) -> Rays:
             of_part = given[part]
             of_rays = {"origins": begins[part] if has_own else begins, name: of_part}
             answer = self._backend.ask("rays", {**of_rays, **fields}, options, deadline)
@@ -93,4 +95,4 @@ class RayQuestions(QuestionGroup):
                 answer.names("keep_outs", count),
             )
 
-        return self._in_parts(ask, QUESTION.checked(scope), len(rows), rows.nbytes + starts.nbytes, shape)
+        return self._in_parts(ask, QUESTION.checked(scope, "cast_rays"), len(rows), rows.nbytes + starts.nbytes, shape)

@@ -8,19 +8,14 @@ A method takes them as `**scope: Unpack[QuestionScope]`, checks what it was give
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from textwrap import fill
-from typing import Annotated, Any, TypedDict, TypeVar, get_type_hints
+from typing import Annotated, Any, TypedDict, get_type_hints
 
 from .._arguments import flag_of, level_of, word_of
 from .._arrays import whole_of
-
-Method = TypeVar("Method", bound=Callable[..., Any])
+from .._option_docs import Method, append_options
 
 Scope = Mapping[str, Any]
 """Options that were given, and checked."""
-
-WIDTH = 120
-"""Columns of what is added to a docstring."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +57,11 @@ class Options:
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=self._options[name].default, annotation=hint.__origin__)
             for name, hint in hints.items()
         ]
+        # The other options of each method.
+        self._own: dict[str, list[str]] = {}
 
-    def checked(self, given: Mapping[str, object]) -> Scope:
-        """The options that were given, checked.
+    def checked(self, given: Mapping[str, object], method: str) -> Scope:
+        """The options that were given to a method beside its own, checked.
 
         Raises `ArgumentError`, and `TypeError` for what is no option.
         """
@@ -74,7 +71,8 @@ class Options:
         for name, value in given.items():
             option = self._options.get(name)
             if option is None:
-                raise TypeError(f"got an unexpected keyword argument {name!r}; options are {', '.join(self._options)}")
+                known = ", ".join([*self._own[method], *self._options])
+                raise TypeError(f"{method}() got an unexpected keyword argument {name!r}; its options are {known}")
             # None is to give nothing, where that is the default.
             if value is not None or option.default is not None:
                 scope[name] = option.checked(value, name)
@@ -87,11 +85,9 @@ class Options:
         method.__signature__ = signature.replace(parameters=[*own, *self._parameters])  # type: ignore[attr-defined]
         of_scope = {of.name: of.annotation for of in self._parameters}
         method.__annotations__ = {name: hint for name, hint in method.__annotations__.items() if name != "scope"} | of_scope
-        descriptions = [f"`{name}`: {option.description}" for name, option in self._options.items()]
-        lines = [fill(description, WIDTH, initial_indent=8 * " ", subsequent_indent=12 * " ") for description in descriptions]
-        method.__doc__ = "\n".join(
-            [f"{(method.__doc__ or '').rstrip()}\n\n        Options of all such questions:\n", *lines, 8 * " "]
-        )
+        descriptions = {name: option.description for name, option in self._options.items()}
+        append_options(method, "Options of all such questions:", descriptions)
+        self._own[method.__name__] = [of.name for of in own if of.kind is inspect.Parameter.KEYWORD_ONLY]
         return method
 
 

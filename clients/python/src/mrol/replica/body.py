@@ -1,5 +1,7 @@
 """Bodies that are asked about often."""
 
+from __future__ import annotations
+
 from ..body import Body, BodyLike
 from .native import mrol_native
 
@@ -13,7 +15,7 @@ class PreparedBody(Body, mrol_native.NativeBody):
     It takes what `mrol.Body.of` takes. All questions take it in the place of a body; `motion_is_free` takes nothing else.
     """
 
-    def __new__(cls, body: BodyLike) -> "PreparedBody":
+    def __new__(cls, body: BodyLike) -> PreparedBody:
         return super().__new__(cls, **Body.of(body).fields(BYTES_MAX))
 
     def __init__(self, body: BodyLike) -> None:

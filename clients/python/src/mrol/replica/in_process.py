@@ -1,5 +1,7 @@
 """What replicas and maps without a server have in common."""
 
+from __future__ import annotations
+
 from types import TracebackType
 from typing import TypeVar
 
@@ -28,7 +30,7 @@ class InProcessMap(Questions):
         vars(self)["motion_is_free"] = native.motion_is_free
 
     def motion_is_free(
-        self, body: PreparedBody, configurations: F32, *, unknown_is_occupied: bool = False, scope: "QuestionScope | None" = None
+        self, body: PreparedBody, configurations: F32, *, unknown_is_occupied: bool = False, scope: QuestionScope | None = None
     ) -> bool:
         """Whether one motion is free, for the innermost loop of a planner.
 
@@ -45,10 +47,8 @@ class InProcessMap(Questions):
     def __enter__(self: Opened) -> Opened:
         return self
 
-    def __exit__(
-        self, kind: "type[BaseException] | None", value: "BaseException | None", traceback: "TracebackType | None"
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None) -> None:
         self.close()
 
-    def __reduce__(self) -> "tuple[object, ...]":
+    def __reduce__(self) -> tuple[object, ...]:
         raise ArgumentError("the map", excerpt(self), "opened anew in each process")

@@ -1,5 +1,7 @@
 """A map without a server."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 
@@ -50,7 +52,7 @@ class LocalMap(InProcessMap):
         self._take(mrol_native.NativeLocalMap(side_m, count, flag_of(bloom, "bloom"), flag_of(moments, "moments")))
 
     @classmethod
-    def load(cls, file: File) -> "LocalMap":
+    def load(cls, file: File) -> LocalMap:
         """The map of a map file.
 
         Raises `InvalidArgument` for what is none, and `OSError` where it cannot be read: of pipes and devices too, which may have
@@ -81,24 +83,24 @@ class LocalMap(InProcessMap):
         self,
         points: ArrayLike,
         *,
-        guess: "PoseLike | None" = None,
-        motion: "PoseLike | None" = None,
+        guess: PoseLike | None = None,
+        motion: PoseLike | None = None,
         constant_velocity: bool = False,
         align: bool = True,
         robot: str = ROBOT,
-        timestamp_ns: "int | None" = None,
-        point_times: "ArrayLike | None" = None,
+        timestamp_ns: int | None = None,
+        point_times: ArrayLike | None = None,
         point_times_from_sweep_start: bool = False,
-        gravity_in_sensor: "ArrayLike | None" = None,
-        guess_covariance: "ArrayLike | None" = None,
-        recover: "bool | None" = None,
-        carve: "bool | None" = None,
+        gravity_in_sensor: ArrayLike | None = None,
+        guess_covariance: ArrayLike | None = None,
+        recover: bool | None = None,
+        carve: bool | None = None,
         force: bool = False,
-        method: "Method | None" = None,
-        range_min_m: "float | None" = None,
-        range_max_m: "float | None" = None,
-        body_m: "BoxLike | None" = None,
-        sensor: "str | None" = None,
+        method: Method | None = None,
+        range_min_m: float | None = None,
+        range_max_m: float | None = None,
+        body_m: BoxLike | None = None,
+        sensor: str | None = None,
         strict: bool = False,
     ) -> ScanAnswer:
         """Aligns a scan and adds it where it fits: see `mrol.Map.insert`. A scan that does not fit is an answer."""
@@ -109,22 +111,22 @@ class LocalMap(InProcessMap):
         self,
         points: ArrayLike,
         *,
-        guess: "PoseLike | None" = None,
-        motion: "PoseLike | None" = None,
+        guess: PoseLike | None = None,
+        motion: PoseLike | None = None,
         constant_velocity: bool = False,
         robot: str = ROBOT,
-        timestamp_ns: "int | None" = None,
-        point_times: "ArrayLike | None" = None,
+        timestamp_ns: int | None = None,
+        point_times: ArrayLike | None = None,
         point_times_from_sweep_start: bool = False,
-        gravity_in_sensor: "ArrayLike | None" = None,
-        guess_covariance: "ArrayLike | None" = None,
-        method: "Method | None" = None,
-        range_min_m: "float | None" = None,
-        range_max_m: "float | None" = None,
-        body_m: "BoxLike | None" = None,
-        sensor: "str | None" = None,
+        gravity_in_sensor: ArrayLike | None = None,
+        guess_covariance: ArrayLike | None = None,
+        method: Method | None = None,
+        range_min_m: float | None = None,
+        range_max_m: float | None = None,
+        body_m: BoxLike | None = None,
+        sensor: str | None = None,
         strict: bool = False,
-        foreground_level: "int | None" = None,
+        foreground_level: int | None = None,
     ) -> ScanAnswer:
         """What inserting a scan would do; the map stays as it is: see `mrol.Map.align`."""
         fields = _fields(locals(), align=True, recover=None, carve=None, force=False)
@@ -134,11 +136,11 @@ class LocalMap(InProcessMap):
         self,
         points: ArrayLike,
         *,
-        gravity_in_sensor: "ArrayLike | None" = None,
-        gravity_in_map: "ArrayLike | None" = None,
-        search_box: "BoxLike | None" = None,
-        time_limit_s: "float | None" = None,
-        candidates: "int | None" = None,
+        gravity_in_sensor: ArrayLike | None = None,
+        gravity_in_map: ArrayLike | None = None,
+        search_box: BoxLike | None = None,
+        time_limit_s: float | None = None,
+        candidates: int | None = None,
         seed: int = 0,
     ) -> Localization:
         """Searches all poses for the one from which a scan was taken: see `mrol.Map.localize`."""
@@ -163,7 +165,7 @@ class LocalMap(InProcessMap):
         version = Version(*found.pop("version"))
         return Localization(version=version, accepted=accepted, candidates=tuple(of_place), rivals=rivals, **found)
 
-    def voxels(self, level: int = 0, *, box: "BoxLike | OrientedBox | None" = None) -> Voxels:
+    def voxels(self, level: int = 0, *, box: BoxLike | OrientedBox | None = None) -> Voxels:
         """The occupied voxels of a level: all, or those with their centers in a box: see `mrol.Map.voxels`."""
         number = whole_of(level, "level", 0, (1 << 32) - 1)
         region = None
@@ -177,7 +179,7 @@ class LocalMap(InProcessMap):
         removed, version = self._made.delete(shape_json(shape, "shape", REGIONS), whole_of(level, "level", 0, (1 << 32) - 1))
         return Deletion(Version(*version), removed, False)
 
-    def _map_scan(self, points: ArrayLike, fields: "dict[str, Any]", *, is_inserted: bool) -> ScanAnswer:
+    def _map_scan(self, points: ArrayLike, fields: dict[str, Any], *, is_inserted: bool) -> ScanAnswer:
         rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
         robot = fields["robot"]
         told = self._made.map_scan(rows, fields, is_inserted)
@@ -198,16 +200,16 @@ class LocalMap(InProcessMap):
         return "<mrol map of this process>"
 
 
-def _rays(sides: "list[list[int]]") -> RayAgreement:
+def _rays(sides: list[list[int]]) -> RayAgreement:
     of_scan, of_map = (RayCounts(*side) for side in sides)
     return RayAgreement(of_scan, of_map)
 
 
-def _rival(pose: "list[float]", sides: "list[list[int]]") -> Rival:
+def _rival(pose: list[float], sides: list[list[int]]) -> Rival:
     return Rival(Pose.of(pose), _rays(sides))
 
 
-def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":
+def _fields(given: dict[str, Any], **fixed: Any) -> dict[str, Any]:
     """The arguments of a scan as the extension takes them."""
     given = {name: value for name, value in given.items() if name not in ("self", "points")} | fixed
     for name, value in given.items():
@@ -225,11 +227,11 @@ def _method(value: object, argument: str) -> str:
     return value
 
 
-def _times(value: ArrayLike, argument: str) -> "NDArray[np.float32]":
+def _times(value: ArrayLike, argument: str) -> NDArray[np.float32]:
     return as_floats(as_numbers(value, argument, TIMES), argument, TIMES, BYTES_MAX).reshape(-1)
 
 
-def _covariance(value: ArrayLike, argument: str) -> "list[float]":
+def _covariance(value: ArrayLike, argument: str) -> list[float]:
     expected = "numbers of shape (6, 6): x y z in meters, then turns in radians"
     covariance = as_numbers(value, argument, expected)
     if covariance.shape not in ((6, 6), (36,)):
@@ -240,7 +242,7 @@ def _covariance(value: ArrayLike, argument: str) -> "list[float]":
 REQUIRED = {"robot", "constant_velocity", "align", "point_times_from_sweep_start", "force", "strict"}
 """What has no value that stands for none."""
 
-TAKEN_AS: "dict[str, Callable[[Any, str], Any]]" = {
+TAKEN_AS: dict[str, Callable[[Any, str], Any]] = {
     "robot": text_of,
     "guess": lambda value, name: Pose.of(value, name).seven(),
     "motion": lambda value, name: Pose.of(value, name).seven(),

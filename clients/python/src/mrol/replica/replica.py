@@ -1,5 +1,7 @@
 """A copy of a server's map, which follows it."""
 
+from __future__ import annotations
+
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -30,7 +32,7 @@ class ReplicaStatus:
     """Whether the server is telling of changes."""
     resets: int
     """How often all of it was copied."""
-    last_error: "str | None"
+    last_error: str | None
     """Why the last watch ended, where it did."""
     age_s: float
     """How long ago the server was heard last, seconds. It says something at least every `watch_heartbeat_s`: an older copy may lack
@@ -58,17 +60,17 @@ class Replica(InProcessMap):
         address: str,
         map: str,
         *,
-        key: "str | None" = None,
-        ca: "File | None" = None,
-        certificate: "File | None" = None,
-        private_key: "File | None" = None,
+        key: str | None = None,
+        ca: File | None = None,
+        certificate: File | None = None,
+        private_key: File | None = None,
         timeout_s: float = TIMEOUT_S,
-        silence_s: "float | None" = None,
-        region: "BoxLike | None" = None,
-        blocks_max: "int | None" = None,
+        silence_s: float | None = None,
+        region: BoxLike | None = None,
+        blocks_max: int | None = None,
         bloom: bool = False,
         viewpoints: bool = True,
-        age_max_s: "float | None" = None,
+        age_max_s: float | None = None,
     ) -> None:
         given = _address_of(address)
         if (certificate is None) != (private_key is None):
@@ -140,5 +142,5 @@ def _secret_of(key: object) -> str:
     return key
 
 
-def _bytes_of(file: "File | None", argument: str, expected: str) -> "bytes | None":
+def _bytes_of(file: File | None, argument: str, expected: str) -> bytes | None:
     return None if file is None else read_secret_file(file, argument, expected)

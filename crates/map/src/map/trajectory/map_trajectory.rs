@@ -121,6 +121,13 @@ impl Trajectory {
         }
     }
 
+    /// The sessions in which a robot has a scan of this id that was not undone; the one that was used last comes first.
+    pub fn sessions_with(&self, robot: &RobotName, scan_id: u64) -> Vec<&SessionName> {
+        let found = self.robots.get(robot).map(|robot| robot.sessions_with(scan_id)).unwrap_or_default();
+        let kept = found.into_iter().filter(|(_, revision)| !self.marked.contains(revision));
+        kept.map(|(session, _)| session).collect()
+    }
+
     /// All scans whose poses are stored, in the order of acceptance: those that were undone are among them until
     /// thinning takes them, so that their ids tell them.
     pub fn stored(&self) -> impl Iterator<Item = &MappedScan> {

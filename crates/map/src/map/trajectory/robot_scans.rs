@@ -89,6 +89,16 @@ impl RobotScans {
         stored.or_else(|| session.has_forgotten(id).then_some(KnownId::TooOld))
     }
 
+    /// The sessions with a stored scan of this id, and the revisions that these made; the one that was used last comes
+    /// first.
+    pub(super) fn sessions_with(&self, id: u64) -> Vec<(&SessionName, u64)> {
+        let found =
+            self.sessions.iter().filter_map(|(name, session)| Some((name, session, session.find(id)?)));
+        let mut found: Vec<_> = found.collect();
+        found.sort_by_key(|(_, session, _)| std::cmp::Reverse(session.last_revision));
+        found.into_iter().map(|(name, _, revision)| (name, revision)).collect()
+    }
+
     /// The robot's own name of a session, where it is known: one text for all scans.
     pub(super) fn session_name(&self, session: &SessionName) -> Option<&SessionName> {
         self.sessions.get_key_value(session).map(|(name, _)| name)
