@@ -66,9 +66,9 @@ impl Track {
             (_, Some((at_ns, pose))) if *at_ns == stamp_ns => Ok(*pose),
             (Some(from), Some(to)) => {
                 let gap_ns = to.0.saturating_sub(from.0);
-                let since_ns = stamp_ns - from.0;
-                let nearest_ns = if since_ns < gap_ns / 2 { since_ns } else { stamp_ns - to.0 };
-                if gap_ns > GAP_MAX_NS && nearest_ns.abs() > beyond_ns {
+                let since_ns = stamp_ns.saturating_sub(from.0);
+                let nearest_ns = if since_ns < gap_ns / 2 { since_ns } else { stamp_ns.saturating_sub(to.0) };
+                if gap_ns > GAP_MAX_NS && nearest_ns.saturating_abs() > beyond_ns {
                     return Err(Some(Outside { off_ns: nearest_ns }));
                 }
                 let motion = Twist::of_motion(&from.1.inv_mul(&to.1), 1.0);

@@ -85,7 +85,7 @@ impl TimesRule {
         let times_ns = nanoseconds(&raw.values, unit);
         let counted = || times_ns.iter().zip(&cloud.points).filter(|(_, point)| is_return(point));
         let is_near = |origin_ns: i64| {
-            counted().all(|(&time, _)| time.saturating_sub(origin_ns).abs() <= FROM_STAMP_MAX_NS)
+            counted().all(|(&time, _)| time.saturating_sub(origin_ns).saturating_abs() <= FROM_STAMP_MAX_NS)
         };
         let mut doubts = Vec::new();
         let from = if is_near(0) {
@@ -125,7 +125,7 @@ impl TimesRule {
             TimesFrom::Last => last_ns,
         };
         let from_stamp = |time_ns: i64| time_ns.saturating_sub(origin_ns);
-        let is_near = |time_ns: i64| from_stamp(time_ns).abs() <= FROM_STAMP_MAX_NS;
+        let is_near = |time_ns: i64| from_stamp(time_ns).saturating_abs() <= FROM_STAMP_MAX_NS;
         if !is_near(first_ns) || !is_near(last_ns) {
             let seconds = |time_ns: i64| from_stamp(time_ns) as f64 * 1e-9;
             return Err(NoTimes::TooFar {

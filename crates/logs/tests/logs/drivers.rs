@@ -94,9 +94,11 @@ fn a_cloud_whose_times_leave_the_unit_of_the_first_has_none() {
     let first = with_times(&[0.0, 0.05, 0.1]);
     let (rule, _) = TimesRule::find(&first, first.times.as_ref().unwrap()).unwrap();
     // Alone, it would be a sweep of 3 ms.
-    let other = with_times(&[0.0, 1.0, 3.0]);
-    let refused = rule.times_s(&other, other.times.as_ref().unwrap()).unwrap_err();
-    assert!(matches!(refused, NoTimes::TooFar { .. }), "{refused}");
+    for times_s in [[0.0, 1.0, 3.0], [f32::MIN, 0.0, f32::MAX]] {
+        let other = with_times(&times_s);
+        let refused = rule.times_s(&other, other.times.as_ref().unwrap()).unwrap_err();
+        assert!(matches!(refused, NoTimes::TooFar { .. }), "{refused}");
+    }
 }
 
 /// A `PointCloud2` of one field x at an offset, and sizes as they are told.
