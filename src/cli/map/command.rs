@@ -15,12 +15,12 @@ use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::true_poses;
 use mrol::console::{OriginChoice, Survey};
-use mrol::offline::Mapper;
+use mrol::offline::{KnownScan, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
-use mrol_map::mapping::{SensorAxes, SensorMount};
+use mrol_map::mapping::{Guess, SensorAxes, SensorMount};
 use mrol_map::scan::{Columns, PointFilter, read_exact_points_by, scan_files, write_trajectory};
 use mrol_store::{Disk, Snapshot};
 
@@ -159,8 +159,15 @@ impl Map {
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
             match Usable::of(survey.read(file)?, None, &filter) {
-                Usable::Points { points, skipped, .. } => {
-                    let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
+                Usable::Points { points, times_s, skipped } => {
+                    let pose = run.guess(k);
+                    let known = KnownScan {
+                        times_s: times_s.as_deref(),
+                        guess: pose.map(Guess::Pose),
+                        at_guess: pose.is_some(),
+                        ..KnownScan::new(k as u64, &points)
+                    };
+                    let mapped = mapper.add_known(known).map_err(|e| in_file(file, e))?;
                     output.print(&run.note((k, k as f64), name_of(file), &mapped, skipped))?;
                 }
                 Usable::Nothing(why) => output.print(&run.skip(file, name_of(file), why))?,

@@ -45,6 +45,10 @@ pub struct Use {
     pub why: String,
 }
 
+/// What is said of planar scans: alignment looks for a pose with six degrees of freedom.
+const PLANAR: &str = "no third dimension: scans in one plane are read, and hardly any of them is accepted, since they do \
+                      not determine a pose in space";
+
 /// Topics that an error lists, at most.
 const TOPICS_LISTED: usize = 12;
 
@@ -61,6 +65,9 @@ impl Plan {
         let source = format!("{name} ({type_name}, frame {:?})", excerpt(&sensor_frame));
         let mut uses = vec![Use { purpose: "clouds", source, why }];
         let mut missing = Vec::new();
+        if summary.kind() == Some(MessageKind::LaserScan) {
+            missing.push(PLANAR.to_owned());
+        }
         note_times(summary, choice, &mut uses, &mut missing);
         let odometry = match OdometrySource::find(survey, choice, &sensor_frame)? {
             Ok((odometry, why)) => {

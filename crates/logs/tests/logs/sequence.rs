@@ -96,6 +96,8 @@ fn a_log_by_others_gives_its_scans_with_odometry_gravity_and_times() {
         }
     }
     let planar = Choice { cloud: Some("/scan".to_owned()), ..Choice::default() };
+    let missing = Plan::of(&survey(&log), &planar).unwrap().missing;
+    assert!(missing.iter().any(|text| text.contains("scans in one plane")), "{missing:?}");
     let (scans, _) = scans(&log, &planar, SequenceOptions::default());
     assert_eq!(scans.len(), 6);
     let [right, ahead, nothing] = scans[0].points[..] else { panic!("{:?}", scans[0].points) };
