@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+#[cfg(feature = "logs")]
+use super::log;
 use super::{
     block, check, classify, completions, config, delete, doctor, events, export, frontiers, grid, health,
     insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot, undo,
@@ -47,6 +49,8 @@ enum Command {
     Demo(Demo),
     Map(map::Map),
     Insert(insert::Insert),
+    #[cfg(feature = "logs")]
+    Log(log::Log),
     Localize(localize::Localize),
     Query(query::Query),
     Check(check::Check),
@@ -99,6 +103,8 @@ impl Command {
             Self::Demo(demo) => runtime::block_on(demo.run(output)),
             Self::Map(map) => map.run(output),
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
+            #[cfg(feature = "logs")]
+            Self::Log(log) => log.run(&output),
             Self::Localize(localize) => runtime::block_on(localize.run(output)),
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Check(check) => runtime::block_on(check.run(output)),

@@ -23,6 +23,8 @@ mod keepout;
 mod key;
 mod lab;
 mod localize;
+#[cfg(feature = "logs")]
+mod log;
 mod man;
 mod map;
 mod maps;

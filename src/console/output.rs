@@ -38,6 +38,21 @@ impl Output {
         Self { bar, ..self }
     }
 
+    /// Adds a progress bar of a file of so many bytes.
+    pub fn with_bar_of_bytes(self, bytes: u64) -> Self {
+        let bar = ProgressBar::new(bytes);
+        let template = "{bar:40} {bytes}/{total_bytes}, {elapsed} gone, {eta} to go";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Self { bar, ..self }
+    }
+
+    /// Sets the bar to a place in the file.
+    pub fn advance_to(&self, bytes: u64) {
+        self.bar.set_position(bytes);
+    }
+
     /// Adds a spinner with a message.
     pub fn with_spinner(self) -> Self {
         let bar = ProgressBar::new_spinner();

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::console::CliError;
+use mrol_map::align::localize::Gravity;
 use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
@@ -26,6 +27,32 @@ pub struct Mapper {
     lost: LostRobots,
     recovers: bool,
     sensor: Option<SensorModel>,
+}
+
+/// A scan to map, and what is known of it.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownScan<'a> {
+    /// Its number, which no other scan has.
+    pub id: u64,
+    /// In the sensor frame, meters, all of them finite.
+    pub points: &'a [Point],
+    /// When it was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// When each point was measured, seconds from the timestamp.
+    pub times_s: Option<&'a [f32]>,
+    /// Direction of gravity in the sensor frame.
+    pub gravity: Option<Gravity>,
+    /// Where it is thought to have been taken; as the mapper is set where nobody knows.
+    pub guess: Option<Guess>,
+    /// The guess is its pose.
+    pub at_guess: bool,
+}
+
+impl<'a> KnownScan<'a> {
+    /// A scan of which nothing else is known.
+    pub fn new(id: u64, points: &'a [Point]) -> Self {
+        Self { id, points, timestamp_ns: None, times_s: None, gravity: None, guess: None, at_guess: false }
+    }
 }
 
 /// Result of mapping a scan.
@@ -117,13 +144,26 @@ impl Mapper {
     /// # Errors
     /// When no point of it lies within the map's range.
     pub fn add(&mut self, k: usize, points: &[Point], known: Option<Pose>) -> Result<Mapped, MappingError> {
+        let guess = known.map(Guess::Pose);
+        self.add_known(KnownScan { guess, at_guess: known.is_some(), ..KnownScan::new(k as u64, points) })
+    }
+
+    /// Aligns a scan to the map, or takes its guess as its pose, and adds it where it fits.
+    ///
+    /// # Errors
+    /// When no point of it lies within the map's range.
+    pub fn add_known(&mut self, known: KnownScan<'_>) -> Result<Mapped, MappingError> {
+        let points = known.points;
         let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
         let sensor = self.sensor.map(|model| SensorRays::confirmed(&model, points));
         let scan = Scan {
             sensor: sensor.and_then(Result::ok),
-            scan_id: Some(k as u64),
-            guess: known.map_or(self.guess, Guess::Pose),
-            at_guess: known.is_some(),
+            scan_id: Some(known.id),
+            timestamp_ns: known.timestamp_ns,
+            times_s: known.times_s,
+            gravity: known.gravity,
+            guess: known.guess.unwrap_or(self.guess),
+            at_guess: known.at_guess,
             ..Scan::new(&self.robot, points)
         };
         let mut mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);

@@ -5,5 +5,5 @@ mod mapper;
 mod truth_errors;
 
 pub use ample::{FalsePositives, FilterSummary};
-pub use mapper::{Mapped, Mapper};
+pub use mapper::{KnownScan, Mapped, Mapper};
 pub use truth_errors::{ErrorSummary, TruthErrors};

@@ -2,11 +2,12 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 30] = [
+const COMMANDS: [&str; 31] = [
     "serve",
     "demo",
     "map",
     "insert",
+    "log",
     "localize",
     "query",
     "check",

@@ -8,6 +8,7 @@ mod errors;
 mod help;
 mod local;
 mod localize;
+mod logs;
 mod questions;
 mod remote;
 #[path = "../support/mod.rs"]

@@ -31,6 +31,12 @@ fn the_core_has_no_runtime_no_protocol_and_no_serialization() {
 }
 
 #[test]
+fn logs_are_read_on_the_core_alone() {
+    let others = ["tokio", "tonic", "prost", "serde", "mrol-store", "mrol-service", "mcap", "lz4-sys"];
+    check_without("mrol-logs", &others);
+}
+
+#[test]
 fn planners_compile_no_server() {
     let server = ["mrol", "axum", "clap", "utoipa", "figment", "metrics", "tonic-health", "tonic-reflection"];
     check_without("mrol-client", &server);

@@ -57,6 +57,9 @@ fn run(page: &Path, blocks: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("repository");
     fs::create_dir(&root).unwrap();
+    // What commands read of the repository.
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    std::os::unix::fs::symlink(crates, root.join("crates")).unwrap();
     let server = Process::start(folder.path().join("data").to_str().unwrap(), &[]);
     let programs = programs(folder.path());
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());

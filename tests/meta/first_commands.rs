@@ -33,7 +33,7 @@ const VENV: &str = "python3 -m venv target/venv && . target/venv/bin/activate";
 /// A page, its first shell command, and how that is run.
 type Row = (&'static str, &'static str, RunBy);
 
-const PAGES: [Row; 20] = [
+const PAGES: [Row; 21] = [
     (".ci/README.md", "", Nothing),
     ("README.md", "cargo run --release -- demo", DEMO),
     ("clients/c/README.md", "cargo build --release -p mrol-c", FirstCommands(LONG)),
@@ -57,6 +57,7 @@ const PAGES: [Row; 20] = [
         OfOthers,
     ),
     ("docs/guide/frames.md", "mrol map --help | grep -A3 -e --axes -e --sensor-height", Documents),
+    ("docs/guide/logs.md", "mrol log crates/logs/tests/fixtures/zstd.mcap", Documents),
     (
         "docs/guide/many-maps.md",
         "mrol maps create building-17 --resolution 0.05 --no-filter --no-moments",

@@ -7,6 +7,8 @@ use std::time::Duration;
 use super::plan::Plan;
 use super::sending::{Answers, Sending};
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
+#[cfg(feature = "logs")]
+use crate::cli::log::LogOptions;
 use crate::cli::maps::OptionalSettings;
 use crate::cli::remote::MapOptions;
 use crate::cli::scan_report::tell_order;
@@ -26,6 +28,7 @@ EXAMPLES:
   mrol insert new/*.ply --map office --robot r2 --guess \"3.1 0.4 0 0 0 0.7071 0.7071\"
   mrol insert scans/ --map office --poses poses.txt         at known poses, without aligning
   mrol insert scans/ --map office --json | jq .verdict
+  mrol insert run.mcap --map office --robot r1              a log of ROS 2: `mrol log run.mcap` says what it has
 
 Each scan is aligned to the map from the robot's last accepted pose; the first from --guess. The first scan of
 an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out; the
@@ -37,57 +40,59 @@ then has the --session and --first-scan-id with which the same command goes on, 
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Insert {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32
+    /// .f32; or one log of a robot: .mcap
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
-    map: MapOptions,
+    pub(super) map: MapOptions,
     /// Name of the robot that sends the scans
     #[arg(long, value_name = "NAME", default_value = "mrol", value_parser = parse::robot_name)]
-    robot: RobotName,
+    pub(super) robot: RobotName,
     /// Where the first scan was taken: "x y z qx qy qz qw"
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
-    guess: Option<Pose>,
+    pub(super) guess: Option<Pose>,
     /// Take --guess as it is, without aligning the first scan
     #[arg(long, requires = "guess")]
-    at_guess: bool,
+    pub(super) at_guess: bool,
     /// Add scans where they were found even if their verdict is not accepted
     #[arg(long)]
-    force: bool,
+    pub(super) force: bool,
     /// Look for the robot where a scan is refused, whatever the server is set to [default: as the server is set]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
-    recover: Option<bool>,
+    pub(super) recover: Option<bool>,
     /// Take out of the map what the scans saw through, whatever the server is set to [default: as the server is set]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
-    carve: Option<bool>,
+    pub(super) carve: Option<bool>,
     /// Guess of every scan but the first: the last accepted pose, or one as far on as that is from the pose before
-    #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
-    next_guess: GuessName,
+    /// [default: previous; of a log without odometry constant-velocity]
+    #[arg(long, value_enum, value_name = "GUESS")]
+    pub(super) next_guess: Option<GuessName>,
     #[command(flatten)]
-    alignment: AlignmentOptions,
+    pub(super) alignment: AlignmentOptions,
     #[command(flatten)]
-    points: PointOptions,
+    pub(super) points: PointOptions,
     /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
     #[arg(long, value_name = "FILE", visible_alias = "poses", conflicts_with = "guess")]
-    truth: Option<PathBuf>,
+    pub(super) truth: Option<PathBuf>,
     /// Number the scans from N on, so that a scan that is sent again in the same session is not added twice [default:
     /// from 0, in a new session]
     #[arg(long, value_name = "N")]
-    first_scan_id: Option<u64>,
-    /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none
-    #[arg(long, value_name = "NAME", requires = "first_scan_id", value_parser = parse::session_name)]
-    session: Option<SessionName>,
+    pub(super) first_scan_id: Option<u64>,
+    /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none; of a log, one that
+    /// follows from its first cloud
+    #[arg(long, value_name = "NAME", value_parser = parse::session_name)]
+    pub(super) session: Option<SessionName>,
     /// For how long scans that were not answered are sent again where the connection breaks or the server restarts,
     /// seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 15, value_parser = clap::value_parser!(u32).range(0..=86_400))]
-    patience: u32,
+    pub(super) patience: u32,
     /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
     #[arg(long, value_name = "NAMES")]
-    columns: Option<Columns>,
+    pub(super) columns: Option<Columns>,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or,
     /// with --create, the first point. It is subtracted from them in double precision
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
-    origin: Option<OriginChoice>,
+    pub(super) origin: Option<OriginChoice>,
     /// Make the map first
     #[arg(long, requires = "resolution")]
     create: bool,
@@ -96,12 +101,22 @@ pub(crate) struct Insert {
     resolution: Option<f64>,
     #[command(flatten)]
     settings: OptionalSettings,
+    #[cfg(feature = "logs")]
+    #[command(flatten)]
+    pub(super) log: LogOptions,
 }
 
 impl Insert {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         if !self.create && self.settings.is_any() {
             return Err(CliError::usage("settings of a map to make are given: say --create too"));
+        }
+        #[cfg(feature = "logs")]
+        if let Some(path) = self.log.path_among(&self.scans)? {
+            return self.run_log(path, output).await;
+        }
+        if self.session.is_some() && self.first_scan_id.is_none() {
+            return Err(CliError::usage("--session of scan files needs --first-scan-id"));
         }
         let files = scan_files(&self.scans)?;
         let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
@@ -119,7 +134,7 @@ impl Insert {
                 None => new_session(),
             },
             first_scan_id: self.first_scan_id.unwrap_or(0),
-            next: self.next_guess.into(),
+            next: self.next_guess.unwrap_or_default().into(),
             method: self.alignment.method(),
             filter: self.points.filter().map_err(CliError::usage)?,
             sensor: self.points.sensor(),
@@ -131,22 +146,22 @@ impl Insert {
         let output = &output.with_bar(files.len());
         let (client, files, counted) = (&client, &files[..], Answers::default());
         let sending = Sending { client, map, files, plan, output, counted };
-        let Answers { answered, failed, refused } =
-            sending.run(Duration::from_secs(self.patience.into())).await?;
+        let answers = sending.run(Duration::from_secs(self.patience.into())).await?;
         output.clear_bar();
-        if answered != files.len() {
-            return Err(CliError::failed(format!("the server answered {answered} of {} scans", files.len())));
+        let (answered, all) = (answers.answered, files.len());
+        if answered != all {
+            return Err(CliError::failed(format!("the server answered {answered} of {all} scans")));
         }
-        match failed {
-            0 => CliError::unless_accepted(refused, answered),
-            _ => Err(CliError::failed(format!(
-                "{failed} of {answered} scans failed; the others were answered"
-            ))),
-        }
+        answers.result()
     }
 
     /// How the scans lie to the map, which is made first where that is wanted.
-    async fn survey(&self, client: &Client, files: &[PathBuf], output: &Output) -> Result<Survey, CliError> {
+    pub(super) async fn survey(
+        &self,
+        client: &Client,
+        files: &[PathBuf],
+        output: &Output,
+    ) -> Result<Survey, CliError> {
         let name = &self.map.name;
         // Who may only insert is not told, and neither is anybody of a map that is not there.
         let there = client.map_info(name).await.ok().map(|info| info.settings);

@@ -2,6 +2,8 @@
 
 mod attempts;
 mod command;
+#[cfg(feature = "logs")]
+mod from_log;
 mod plan;
 mod report;
 mod sending;

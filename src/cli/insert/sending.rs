@@ -16,7 +16,7 @@ use mrol_client::{Client, ClientError};
 use mrol_map::map::MapName;
 
 /// Scans read ahead of the one that is being sent.
-const SCANS_AHEAD: usize = 2;
+pub(super) const SCANS_AHEAD: usize = 2;
 
 /// Numbers of scans that the server answered.
 #[derive(Default, Clone, Copy)]
@@ -27,6 +27,22 @@ pub(super) struct Answers {
     pub(super) failed: usize,
     /// Those that are not in the map because their verdict is not `accepted`.
     pub(super) refused: usize,
+}
+
+impl Answers {
+    /// Whether the command did what it should.
+    ///
+    /// # Errors
+    /// When scans failed, or were not accepted.
+    pub(super) fn result(self) -> Result<(), CliError> {
+        let Self { answered, failed, refused } = self;
+        match failed {
+            0 => CliError::unless_accepted(refused, answered),
+            _ => Err(CliError::failed(format!(
+                "{failed} of {answered} scans failed; the others were answered"
+            ))),
+        }
+    }
 }
 
 /// The files of scans on their way.
@@ -125,11 +141,7 @@ impl Sending<'_> {
         if is_passing(&error) {
             return Stopped::ForNow(error);
         }
-        let advice = match error.reason() {
-            Some("guess_required") => "; --guess says where the first scan was taken",
-            Some("map_not_found") => "; --create --resolution METERS makes it",
-            _ => "",
-        };
+        let advice = advice(&error);
         Stopped::ForGood(CliError::failed(format!("{}: {error}{advice}", self.name())))
     }
 
@@ -144,8 +156,17 @@ impl Sending<'_> {
     }
 }
 
+/// What helps against a failure.
+pub(super) fn advice(error: &ClientError) -> &'static str {
+    match error.reason() {
+        Some("guess_required") => "; --guess says where the first scan was taken",
+        Some("map_not_found") => "; --create --resolution METERS makes it",
+        _ => "",
+    }
+}
+
 /// True of a failure that all scans after it would share.
-fn concerns_all(error: &ClientError) -> bool {
+pub(super) fn concerns_all(error: &ClientError) -> bool {
     matches!(
         error.reason(),
         Some("guess_required" | "map_not_found" | "map_not_allowed" | "robot_not_allowed")

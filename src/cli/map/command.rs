@@ -1,30 +1,27 @@
 //! The command `mrol map`.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use nalgebra::Point3;
 use uuid::Uuid;
 
-use super::report::{ScanLine, SkippedLine, Summary};
+use super::run::{KnownPoses, Run, Usable, in_file};
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
-use crate::cli::scan_report::{name_of, tell_order};
+#[cfg(feature = "logs")]
+use crate::cli::log::LogOptions;
+use crate::cli::scan_report::{name_of, name_width, tell_order};
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::true_poses;
 use mrol::console::{OriginChoice, Survey};
-use mrol::offline::FalsePositives;
-use mrol::offline::TruthErrors;
-use mrol::offline::{Mapped, Mapper};
+use mrol::offline::{KnownScan, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
-use mrol_map::mapping::{SensorAxes, SensorMount};
-use mrol_map::scan::{
-    Columns, PointFilter, SkippedPoints, StampedPose, read_exact_points_by, scan_files, write_trajectory,
-};
+use mrol_map::mapping::{Guess, SensorAxes, SensorMount};
+use mrol_map::scan::{Columns, PointFilter, read_exact_points_by, scan_files, write_trajectory};
 use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
@@ -38,6 +35,7 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
                                                              a map for queries, in a small part of the memory
   mrol map scans/ --resolution 0.1 --carve --out office.mrol     without those who walked by
+  mrol map run.mcap --resolution 0.1 --out hall.mrol         a log of ROS 2: `mrol log run.mcap` says what it has
   mrol map utm/*.pcd --resolution 0.1 --origin auto --out site.mrol     scans in the coordinates of a survey
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
@@ -53,7 +51,7 @@ when --lookup is given.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32
+    /// .f32; or one log of a robot: .mcap
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters
@@ -64,15 +62,15 @@ pub(crate) struct Map {
     levels: u32,
     /// Where the first scan was taken: "x y z qx qy qz qw" [default: the origin]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
-    first_pose: Option<Pose>,
+    pub(super) first_pose: Option<Pose>,
     /// Which way the sensor's axes point: x ahead, y left, z up (robot), or a camera's, x right, y down, z ahead
     /// (optical). The first scan is put upright in the map [default: robot]
     #[arg(long, value_parser = parse::keyword::<SensorAxes>(), conflicts_with_all = ["first_pose", "at_truth", "poses"])]
-    axes: Option<SensorAxes>,
+    pub(super) axes: Option<SensorAxes>,
     /// Height of the sensor above the floor: the first scan is put so high above the map's origin [default: 0]
     #[arg(long, value_name = "METERS", allow_hyphen_values = true, value_parser = parse::sensor_height,
           conflicts_with_all = ["first_pose", "at_truth", "poses"])]
-    sensor_height: Option<f64>,
+    pub(super) sensor_height: Option<f64>,
     /// Write the poses of accepted scans as a TUM file, a line `k x y z qx qy qz qw` for scan k
     #[arg(long, value_name = "FILE")]
     trajectory_out: Option<PathBuf>,
@@ -101,9 +99,9 @@ pub(crate) struct Map {
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     carve: Option<bool>,
     /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one
-    /// before it
-    #[arg(long, value_enum, default_value_t)]
-    guess: GuessName,
+    /// before it [default: previous; of a log without odometry constant-velocity]
+    #[arg(long, value_enum)]
+    pub(super) guess: Option<GuessName>,
     #[command(flatten)]
     alignment: AlignmentOptions,
     #[command(flatten)]
@@ -114,11 +112,11 @@ pub(crate) struct Map {
     keep_zeros: bool,
     /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
     #[arg(long, value_name = "NAMES")]
-    columns: Option<Columns>,
+    pub(super) columns: Option<Columns>,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It
     /// is subtracted from them in double precision, and kept in the map
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
-    origin: Option<OriginChoice>,
+    pub(super) origin: Option<OriginChoice>,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
     #[arg(long, value_parser = parse::keyword::<Lookup>())]
     lookup: Option<Lookup>,
@@ -134,47 +132,86 @@ pub(crate) struct Map {
     /// No moments of points: scans are aligned by overlap alone
     #[arg(long)]
     no_moments: bool,
+    #[cfg(feature = "logs")]
+    #[command(flatten)]
+    pub(super) log: LogOptions,
 }
 
 impl Map {
     pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
         let alignment = self.alignment_settings()?;
         self.map_settings().checked().map_err(CliError::usage)?;
-        let filter = self.points.filter().map_err(CliError::usage)?;
-        let filter = PointFilter { keep_zeros: self.keep_zeros, ..filter };
+        let filter = self.filter()?;
+        #[cfg(feature = "logs")]
+        if let Some(path) = self.log.path_among(&self.scans)? {
+            return self.run_log(path, alignment, filter, output);
+        }
         let files = scan_files(&self.scans)?;
         let truth = self.poses_file().map(|path| true_poses(path, files.len(), &output)).transpose()?;
-        self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
+        self.check_folders()?;
 
         tell_order(&files, &output)?;
         let (survey, origin) = self.survey(&files, &output)?;
         let settings = MapSettings { origin, ..self.map_settings() };
-        let mapper = Mapper::new(settings, alignment, self.guess.into())?;
-        let mapper = mapper.recovering(!self.no_recovery).carving(self.carve == Some(true));
-        let mapper = mapper.mounted(self.mount());
-        let mut mapper = mapper.with_sensor(self.points.sensor());
+        let mut mapper = self.mapper(settings, alignment, self.guess.unwrap_or_default())?;
         if let Some(MapOrigin { position_m: [x, y, z] }) = origin {
             output.note(format!("origin of the map: {x} {y} {z}"));
         }
-        let mut run = Run::new(&self, truth, &files, survey);
+        let known = KnownPoses { first: self.first_pose, truth, at_truth: self.at_poses() };
+        let mut run = Run::new(known, survey, name_width(&files));
         let output = output.with_bar(files.len());
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
-            match usable_points(file, &filter, &survey)? {
-                Usable::Points(points, skipped) => {
-                    let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
-                    output.print(&run.note(k, file, &mapped, skipped))?;
+            match Usable::of(survey.read(file)?, None, &filter) {
+                Usable::Points { points, times_s, skipped } => {
+                    let pose = run.guess(k);
+                    let known = KnownScan {
+                        times_s: times_s.as_deref(),
+                        guess: pose.map(Guess::Pose),
+                        at_guess: pose.is_some(),
+                        ..KnownScan::new(k as u64, &points)
+                    };
+                    let mapped = mapper.add_known(known).map_err(|e| in_file(file, e))?;
+                    output.print(&run.note((k, k as f64), name_of(file), &mapped, skipped))?;
                 }
-                Usable::Nothing(why) => output.print(&run.skip(file, why))?,
+                Usable::Nothing(why) => output.print(&run.skip(file, name_of(file), why))?,
             }
             output.step();
         }
+        self.finish(&mapper, run, &output)
+    }
+
+    fn filter(&self) -> Result<PointFilter, CliError> {
+        let filter = self.points.filter().map_err(CliError::usage)?;
+        Ok(PointFilter { keep_zeros: self.keep_zeros, ..filter })
+    }
+
+    /// Checks that the folders of all outputs exist, so that a long run does not fail at its end.
+    pub(super) fn check_folders(&self) -> Result<(), CliError> {
+        self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))
+    }
+
+    /// A mapper of an empty map, by the options.
+    pub(super) fn mapper(
+        &self,
+        settings: MapSettings,
+        alignment: AlignmentSettings,
+        guess: GuessName,
+    ) -> Result<Mapper, CliError> {
+        let mapper = Mapper::new(settings, alignment, guess.into())?;
+        let mapper =
+            mapper.recovering(!self.no_recovery).carving(self.carve == Some(true)).mounted(self.mount());
+        Ok(mapper.with_sensor(self.points.sensor()))
+    }
+
+    /// Writes what is to be kept, and says what was done.
+    pub(super) fn finish(&self, mapper: &Mapper, mut run: Run, output: &Output) -> Result<(), CliError> {
         output.clear_bar();
         run.check_any()?;
-        self.write_results(&mapper, &run)?;
+        self.write_results(mapper, &run)?;
         // Programs get only the scans, unless they ask for what is in the summary.
         if !output.is_json() || self.poses_file().is_some() || self.lookup.is_some() {
-            output.print(&run.summary(&mapper, self.lookup))?;
+            output.print(&run.summary(mapper, self.lookup))?;
         }
         output.say(self.what_next())
     }
@@ -208,7 +245,7 @@ impl Map {
     }
 
     /// The file of poses, whatever they are for.
-    fn poses_file(&self) -> Option<&PathBuf> {
+    pub(super) fn poses_file(&self) -> Option<&PathBuf> {
         self.truth.as_ref().or(self.poses.as_ref())
     }
 
@@ -231,7 +268,7 @@ impl Map {
         trajectory.into_iter().chain([map]).collect::<Vec<_>>().join("; ")
     }
 
-    fn map_settings(&self) -> MapSettings {
+    pub(super) fn map_settings(&self) -> MapSettings {
         let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
         MapSettings {
             filter: (!self.no_filter).then_some(filter),
@@ -265,130 +302,7 @@ impl Map {
 /// A scan file and its points, as it has them.
 type ExactScan<'a> = (&'a Path, Vec<Point3<f64>>);
 
-/// State of a run.
-struct Run {
-    survey: Survey,
-    first_pose: Option<Pose>,
-    at_truth: bool,
-    truth: Option<TruthErrors>,
-    trajectory: Vec<StampedPose>,
-    /// Scans that were mapped or refused.
-    scans: usize,
-    /// Scans that had no point to map, and why the first of them had none.
-    skipped: usize,
-    first_skipped: Option<CliError>,
-    false_positives: FalsePositives,
-    name_width: usize,
-    start: Instant,
-}
-
-impl Run {
-    fn new(options: &Map, truth: Option<Vec<Pose>>, files: &[PathBuf], survey: Survey) -> Self {
-        let to_map = |pose: Pose| survey.to_map(&pose);
-        let truth = truth.map(|poses| poses.into_iter().map(to_map).collect());
-        Self {
-            survey,
-            first_pose: options.first_pose.map(to_map),
-            at_truth: options.at_poses(),
-            truth: truth.map(TruthErrors::new),
-            trajectory: Vec::new(),
-            scans: 0,
-            skipped: 0,
-            first_skipped: None,
-            false_positives: FalsePositives::default(),
-            name_width: crate::cli::scan_report::name_width(files),
-            start: Instant::now(),
-        }
-    }
-
-    fn head(&self) -> String {
-        ScanLine::head(self.name_width, self.truth.is_some())
-    }
-
-    /// Known pose of scan `k`, map_from_sensor, if there is one.
-    fn guess(&self, k: usize) -> Option<Pose> {
-        let truth = self.truth.as_ref().filter(|_| self.at_truth);
-        truth.map(|truth| truth.pose(k)).or(self.first_pose.filter(|_| self.scans == 0))
-    }
-
-    /// Records a scan that has no point to map; returns its line.
-    fn skip(&mut self, file: &Path, why: String) -> SkippedLine {
-        self.skipped += 1;
-        self.first_skipped.get_or_insert_with(|| in_file(file, &why));
-        SkippedLine::of(name_of(file), why, self.name_width)
-    }
-
-    /// Refuses a run in which no scan had a point to map: there is no map to write.
-    fn check_any(&mut self) -> Result<(), CliError> {
-        match self.first_skipped.take().filter(|_| self.scans == 0) {
-            Some(why) => Err(why),
-            None => Ok(()),
-        }
-    }
-
-    /// Records the result of scan `k`; returns its line.
-    fn note(&mut self, k: usize, file: &Path, mapped: &Mapped, skipped: SkippedPoints) -> ScanLine {
-        self.scans += 1;
-        self.false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
-        let map_from_sensor = mapped.alignment.map_from_sensor;
-        let accepted = mapped.accepted();
-        if accepted {
-            let map_from_sensor = self.survey.to_survey(&map_from_sensor);
-            self.trajectory.push(StampedPose { id: k as f64, map_from_sensor });
-        }
-        let error = self.truth.as_mut().filter(|_| accepted).map(|truth| truth.add(k, &map_from_sensor));
-        let skipped = SkippedPoints { beyond_map: mapped.beyond_map, ..skipped };
-        ScanLine::of(name_of(file), mapped, &skipped, error, self.name_width)
-    }
-
-    /// The summary of the run; that of the filters where somebody asked them by name.
-    fn summary(&self, mapper: &Mapper, asked: Option<Lookup>) -> Summary {
-        Summary {
-            scans: self.scans + self.skipped,
-            accepted: self.trajectory.len(),
-            refused: self.scans - self.trajectory.len(),
-            skipped: self.skipped,
-            voxels: mapper.map().voxels(0),
-            resolution_m: mapper.map().settings().resolution_m,
-            levels: mapper.map().settings().levels,
-            seconds: self.start.elapsed().as_secs_f64(),
-            error: self.truth.as_ref().and_then(TruthErrors::summary),
-            filter: (asked.is_some() && mapper.asks_filters())
-                .then(|| self.false_positives.summary(mapper.false_positive_rate())),
-        }
-    }
-}
-
-/// What a scan file has for the map.
-enum Usable {
-    /// Points that pass the filter, and how many do not.
-    Points(Vec<Point>, SkippedPoints),
-    /// No point that passes, for this reason.
-    Nothing(String),
-}
-
-/// Reads the points of a scan that pass the filter, and counts those that do not.
-fn usable_points(file: &Path, filter: &PointFilter, survey: &Survey) -> Result<Usable, CliError> {
-    let mut points = survey.read(file)?;
-    let skipped = SkippedPoints::of(&points, filter);
-    points.retain(|&point| filter.keeps(point));
-    Ok(match (skipped.points, points.is_empty()) {
-        (0, _) => Usable::Nothing("no point in this file".to_owned()),
-        (all, true) if skipped.not_finite + skipped.zeros == all => Usable::Nothing(format!(
-            "none of its {all} points is a return ({skipped}); --keep-zeros keeps those at 0 0 0"
-        )),
-        (_, true) => Usable::Nothing(format!(
-            "none of its points passes --range-min, --range-max and --body ({skipped})"
-        )),
-        _ => Usable::Points(points, skipped),
-    })
-}
-
-fn in_file(file: &Path, problem: impl std::fmt::Display) -> CliError {
-    CliError::failed(format!("{}: {problem}", file.display()))
-}
-
-/// Checks that the folder of an output file exists, so that a long run does not fail at its end.
+/// Checks that the folder of an output file exists.
 fn check_folder(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match folder.is_dir() {

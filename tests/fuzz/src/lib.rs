@@ -3,6 +3,7 @@
 
 mod frames;
 mod journal;
+mod log;
 mod map_file;
 mod map_state;
 mod record;
@@ -15,13 +16,14 @@ mod simulated;
 pub type Target = fn(&[u8]);
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 6] = [
+pub const TARGETS: [(&str, Target); 7] = [
     ("journal", journal::journal),
     ("record", record::record),
     ("map_file", map_file::map_file),
     ("ply", scan_files::ply),
     ("pcd", scan_files::pcd),
     ("text", scan_files::text),
+    ("log", log::log),
 ];
 
 /// Calls the target of that name.

@@ -1,0 +1,9 @@
+//! Frames: the tree of transforms, and tracks of poses over time.
+
+mod error;
+mod track;
+mod tree;
+
+pub use error::{BadTransform, NoTransform, Seconds};
+pub use track::{EXTRAPOLATION_MAX_NS, Outside, Track};
+pub use tree::{FRAMES_MAX, FrameTree, NAME_BYTES_MAX};

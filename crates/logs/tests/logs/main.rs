@@ -1,0 +1,8 @@
+//! Logs as drivers and recorders write them become scans, and scans a map.
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod drivers;
+mod mapping;
+mod mcap;
+mod sequence;
+mod support;

@@ -1,0 +1,218 @@
+//! `mrol insert` of a robot's log.
+
+use std::path::Path;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+
+use super::attempts::{Attempts, is_passing};
+use super::command::Insert;
+use super::report::{FailedLine, ScanLine};
+use super::sending::{Answers, SCANS_AHEAD, advice, concerns_all};
+use crate::cli::alignment_options::GuessName;
+use crate::cli::log::{LogFile, LogScans, name_of_stamp};
+use mrol::console::{CliError, Output};
+use mrol_client::{Client, ClientError};
+use mrol_logs::sequence::{LoggedScan, Odometer};
+use mrol_map::map::SessionName;
+use mrol_map::mapping::Guess;
+use mrol_service::{PointTimes, ScanAnswer, ScanRequest, TimeReference};
+
+/// Characters of a scan's name: a stamp of this century, in milliseconds.
+const NAME_WIDTH: usize = 14;
+
+impl Insert {
+    /// Sends the clouds of a log, one after the other: the guess of each counts from the last one that was accepted.
+    pub(super) async fn run_log(&self, path: &Path, output: Output) -> Result<(), CliError> {
+        self.refuse_options_of_files()?;
+        let (log, scans) = LogFile::open(path, &self.log, &output)?;
+        let session = match &self.session {
+            Some(session) => session.clone(),
+            None => SessionName::new(&log.session(&scans)).map_err(CliError::failed)?,
+        };
+        let client = self.map.server.connect().await?;
+        self.survey(&client, &[], &output).await?;
+        let mut sending = LogSending {
+            insert: self,
+            client: &client,
+            path,
+            done_ns: self.last_inserted_ns(&client, &session).await,
+            session,
+            odometer: Odometer::default(),
+            counted: Answers::default(),
+            output: output.with_bar_of_bytes(log.bytes),
+        };
+        if let Some(done_ns) = sending.done_ns {
+            let stamp = name_of_stamp(done_ns);
+            sending.output.note(format!("the map has this log up to {stamp}: it goes on from there"));
+        }
+        let (sender, receiver) = mpsc::channel(SCANS_AHEAD);
+        let reader_output = sending.output.clone();
+        let reader = tokio::task::spawn_blocking(move || read(scans, &sender, &reader_output));
+        let sent = sending.run(receiver).await;
+        // What is read has ended, or nobody receives it any more.
+        let read = reader.await.map_err(CliError::failed)?;
+        sending.output.clear_bar();
+        sent?;
+        read?;
+        sending.counted.result()
+    }
+
+    /// The stamp of the log's last scan that the map keeps, which an earlier start of this command sent.
+    async fn last_inserted_ns(&self, client: &Client, session: &SessionName) -> Option<i64> {
+        // Who may only insert is not told: the server then answers scans again that it has.
+        let trajectory = client.trajectory(&self.map.name, Some(&self.robot)).await.ok()?;
+        let of_log = trajectory.poses.iter().rev().find(|pose| pose.session == *session);
+        of_log.and_then(|pose| pose.timestamp_ns)
+    }
+
+    fn refuse_options_of_files(&self) -> Result<(), CliError> {
+        let given = [
+            ("--poses", self.truth.is_some()),
+            ("--origin", self.origin.is_some()),
+            ("--columns", self.columns.is_some()),
+            ("--first-scan-id", self.first_scan_id.is_some()),
+        ];
+        match given.into_iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(CliError::usage(format!("{option}: for scan files, not for a log"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Reads the scans of a log until nobody receives them.
+fn read(
+    mut scans: LogScans,
+    sender: &mpsc::Sender<(LoggedScan, u64)>,
+    output: &Output,
+) -> Result<(), CliError> {
+    while let Some(scan) = scans.next(output)? {
+        if sender.blocking_send(scan).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The scans of a log on their way.
+struct LogSending<'a> {
+    insert: &'a Insert,
+    client: &'a Client,
+    path: &'a Path,
+    session: SessionName,
+    /// Scans up to this stamp were sent by an earlier start of the command.
+    done_ns: Option<i64>,
+    odometer: Odometer,
+    counted: Answers,
+    output: Output,
+}
+
+impl LogSending<'_> {
+    async fn run(&mut self, mut scans: mpsc::Receiver<(LoggedScan, u64)>) -> Result<(), CliError> {
+        let filter = self.insert.points.filter().map_err(CliError::usage)?;
+        let (mut is_first, mut taken) = (true, 0usize);
+        while let Some((mut scan, position)) = scans.recv().await {
+            self.output.advance_to(position);
+            taken += 1;
+            if self.done_ns.is_some_and(|done_ns| scan.stamp_ns <= done_ns) {
+                self.odometer.accepted(&scan);
+                is_first = false;
+                continue;
+            }
+            if !scan.points.iter().any(|&point| filter.keeps(point)) {
+                self.output.note(format!("the cloud of {} has no return", name_of_stamp(scan.stamp_ns)));
+                continue;
+            }
+            let request = self.request(&mut scan, is_first)?;
+            is_first = !self.send(&scan, request).await? && is_first;
+        }
+        match taken {
+            0 => Err(CliError::failed(format!(
+                "{}: no cloud of the log is taken: see the notes above, and --from, --to",
+                self.path.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn request(&self, scan: &mut LoggedScan, is_first: bool) -> Result<ScanRequest, CliError> {
+        let insert = self.insert;
+        let told = insert.guess.filter(|_| is_first).map(Guess::Pose);
+        let next = insert.next_guess.unwrap_or(GuessName::ConstantVelocity).into();
+        let guess = told.or_else(|| self.odometer.guess(scan));
+        let points = std::mem::take(&mut scan.points);
+        let times_s = scan.times_s.take();
+        Ok(ScanRequest {
+            session: self.session.clone(),
+            scan_id: Some(scan.stamp_ns as u64),
+            timestamp_ns: Some(scan.stamp_ns),
+            point_times: times_s.map(|times_s| PointTimes::new(&times_s, TimeReference::Timestamp)),
+            // A robot that drives accelerates, which is no direction of gravity.
+            gravity: scan.gravity.filter(|_| is_first),
+            guess: guess.unwrap_or(if is_first { Guess::Last } else { next }),
+            at_guess: told.is_some() && insert.at_guess,
+            force: insert.force,
+            recover: insert.recover,
+            carve: insert.carve,
+            method: insert.alignment.method(),
+            filter: insert.points.filter().map_err(CliError::usage)?,
+            sensor: insert.points.sensor(),
+            ..ScanRequest::new(insert.robot.clone(), points.into())
+        })
+    }
+
+    /// Sends a scan until it is answered, and prints the answer; true where the map took it.
+    async fn send(&mut self, scan: &LoggedScan, request: ScanRequest) -> Result<bool, CliError> {
+        let name = name_of_stamp(scan.stamp_ns);
+        match self.answer(&name, request).await? {
+            Ok(answer) => {
+                if self.counted.answered == 0 {
+                    self.output.say(ScanLine::head(NAME_WIDTH))?;
+                }
+                self.output.print(&ScanLine::of(name, &answer, NAME_WIDTH))?;
+                self.counted.answered += 1;
+                self.counted.refused += usize::from(!answer.accepted);
+                if answer.accepted {
+                    self.odometer.accepted(scan);
+                }
+                Ok(answer.accepted)
+            }
+            Err(error) => {
+                self.output.print(&FailedLine { scan: name, error: error.to_string() })?;
+                self.counted.answered += 1;
+                self.counted.failed += 1;
+                Ok(false)
+            }
+        }
+    }
+
+    /// The answer to a scan, which is sent again for as long as the options say; or why this scan alone has none.
+    async fn answer(
+        &self,
+        name: &str,
+        request: ScanRequest,
+    ) -> Result<Result<ScanAnswer, ClientError>, CliError> {
+        let mut attempts = Attempts::new(Duration::from_secs(self.insert.patience.into()));
+        loop {
+            let error = match self.client.insert_scan(&self.insert.map.name, request.clone()).await {
+                Ok(answer) => return Ok(Ok(answer)),
+                Err(error) => error,
+            };
+            if !is_passing(&error) {
+                return match &error {
+                    ClientError::Refused { .. } if !concerns_all(&error) => Ok(Err(error)),
+                    _ => Err(CliError::failed(format!("{name}: {error}{}", advice(&error)))),
+                };
+            }
+            if attempts.is_first() {
+                self.output.note(format!("{error}; going on with {name} once that is possible"));
+            }
+            if !attempts.pause().await {
+                return Err(CliError::failed(format!(
+                    "{name}: {error}; {} scans were answered. The same command goes on from there, and adds no scan twice",
+                    self.counted.answered
+                )));
+            }
+        }
+    }
+}
