@@ -1,7 +1,7 @@
 //! Work that others are not to wait for: it uses the cores that robots whose scans fit leave.
 //!
-//! Threads of a lower priority would do the same, but for one thing: where such a thread holds a lock of a map it hardly
-//! runs, and all others wait for it. So this work pauses by itself, between its parts, where it holds no lock.
+//! Threads of a lower priority would do the same, but for one thing: where such a thread holds a lock of a map it
+//! hardly runs, and all others wait for it. So this work pauses by itself, between its parts, where it holds no lock.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
