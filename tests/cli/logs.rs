@@ -42,6 +42,11 @@ impl Log {
 
     /// A robot that drives an arc, with its transforms or without.
     fn of_a_ride(frames: bool) -> Self {
+        Self::of_scans(SCANS, frames, 0)
+    }
+
+    /// The first scans of the ride; the clock is set by so much after the third.
+    fn of_scans(scans: usize, frames: bool, set_by_ns: i64) -> Self {
         let mut log = McapWriter::default();
         let points = log.topic("/points", "sensor_msgs/msg/PointCloud2");
         let tf = log.topic("/tf", "tf2_msgs/msg/TFMessage");
@@ -50,9 +55,9 @@ impl Log {
         let start = Pose::new(Vector3::new(10.0, 5.0, 1.0), Vector3::zeros());
         let lidar = SpinningLidar { rings: RINGS.into(), azimuths: 360, ..SpinningLidar::default() };
         let (scene, mut random) = (Scene::hall(1), ChaCha8Rng::seed_from_u64(1));
-        for k in 0..SCANS {
+        for k in 0..scans {
             let end_s = k as f64 * TURN_S;
-            let end_ns = START_NS + (end_s * 1e9).round() as i64;
+            let end_ns = START_NS + (end_s * 1e9).round() as i64 + if k < 3 { 0 } else { set_by_ns };
             let pose = |time_s: f64| start * twist.motion(end_s + time_s);
             let (sweep, times_s): (Vec<Point>, Vec<f32>) =
                 lidar.sweep(&scene, TURN_S / 2.0, pose, &mut random);
@@ -127,6 +132,21 @@ fn a_log_becomes_a_map_and_the_same_one_on_a_server() {
     let rest = objects(&part);
     assert_eq!((first.len(), rest.len()), (3, 2));
     assert_eq!(rest[1]["map_from_sensor"], there[4]["map_from_sensor"]);
+    assert_eq!(server.stop(), Some(0));
+}
+
+#[test]
+fn a_log_goes_on_where_it_ended_in_the_log_whatever_its_clock_says() {
+    let server = Process::start("", &[]);
+    let sent = |log: &Log, more: &[&str]| {
+        let insert = ["insert", &log.path, "--map", "a", "--robot", "r1", "--server", &server.grpc, "--json"];
+        let sent = mrol(&[&insert[..], more].concat()).output().unwrap();
+        String::from_utf8(sent.stdout).unwrap().lines().count()
+    };
+    let back_ns = -10_000_000_000;
+    let [part, whole] = [3, SCANS].map(|scans| Log::of_scans(scans, false, back_ns));
+    assert_eq!(sent(&part, &[&["--create"], &SETTINGS[..]].concat()), 3);
+    assert_eq!(sent(&whole, &[]), SCANS - 3, "those after the clock was set back");
     assert_eq!(server.stop(), Some(0));
 }
 

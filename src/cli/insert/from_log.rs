@@ -100,7 +100,8 @@ struct LogSending<'a> {
     client: &'a Client,
     path: &'a Path,
     session: SessionName,
-    /// Scans up to this stamp were sent by an earlier start of the command.
+    /// Scans up to the one of this stamp, in the order of the log, were sent by an earlier start of the command; none
+    /// once it was met.
     done_ns: Option<i64>,
     odometer: Odometer,
     counted: Answers,
@@ -114,8 +115,9 @@ impl LogSending<'_> {
         while let Some((mut scan, position)) = scans.recv().await {
             self.output.advance_to(position);
             taken += 1;
-            if self.done_ns.is_some_and(|done_ns| scan.stamp_ns <= done_ns) {
+            if let Some(done_ns) = self.done_ns {
                 self.odometer.accepted(&scan);
+                self.done_ns = self.done_ns.filter(|_| scan.stamp_ns != done_ns);
                 is_first = false;
                 continue;
             }
@@ -125,6 +127,14 @@ impl LogSending<'_> {
             }
             let request = self.request(&mut scan, is_first)?;
             is_first = !self.send(&scan, request).await? && is_first;
+        }
+        if let Some(done_ns) = self.done_ns.filter(|_| taken > 0) {
+            return Err(CliError::failed(format!(
+                "{}: the map has the cloud of {} in session {}, which these options do not take, so that nothing is known                  to be new: start it with the options of before, or with another --session",
+                self.path.display(),
+                name_of_stamp(done_ns),
+                self.session
+            )));
         }
         match taken {
             0 => Err(CliError::failed(format!(

@@ -75,11 +75,13 @@ impl LogFile {
         Ok((file, scans))
     }
 
-    /// A name of this log's scans that another log hardly has, and a copy of it has: of the topic and its first stamp.
+    /// A name of this log's scans that another log hardly has, and a copy of it has: of the topic, its first stamp and its
+    /// first message.
     pub(crate) fn session(&self, scans: &LogScans) -> String {
         let summary = &self.survey.topics[scans.cloud];
         let topic: String = summary.topic.name.chars().filter(char::is_ascii_alphanumeric).take(20).collect();
-        format!("log-{topic}-{}", summary.first_stamp_ns.unwrap_or_default())
+        let (stamp_ns, checksum) = (summary.first_stamp_ns, summary.first_checksum);
+        format!("log-{topic}-{}-{:08x}", stamp_ns.unwrap_or_default(), checksum.unwrap_or_default())
     }
 }
 
@@ -130,8 +132,8 @@ impl LogScans {
 
 /// The name of a scan, for a column: its stamp in seconds.
 pub(crate) fn name_of_stamp(stamp_ns: i64) -> String {
-    let seconds = stamp_ns.div_euclid(1_000_000_000);
-    format!("{seconds}.{:03}", stamp_ns.rem_euclid(1_000_000_000) / 1_000_000)
+    let (sign, ns) = (if stamp_ns < 0 { "-" } else { "" }, stamp_ns.unsigned_abs());
+    format!("{sign}{}.{:03}", ns / 1_000_000_000, ns % 1_000_000_000 / 1_000_000)
 }
 
 fn open(path: &Path) -> Result<(McapReader<BufReader<File>>, u64), CliError> {
@@ -143,4 +145,16 @@ fn open(path: &Path) -> Result<(McapReader<BufReader<File>>, u64), CliError> {
 
 fn in_file(path: &Path, problem: impl std::fmt::Display) -> CliError {
     CliError::failed(format!("{}: {problem}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::name_of_stamp;
+
+    #[test]
+    fn a_stamp_is_named_in_seconds_before_1970_too() {
+        for (stamp_ns, name) in [(1_500_000_000, "1.500"), (0, "0.000"), (-4_800_000_000, "-4.800")] {
+            assert_eq!(name_of_stamp(stamp_ns), name);
+        }
+    }
 }

@@ -26,6 +26,14 @@ pub enum NoTimes {
         /// The time.
         value: f64,
     },
+    /// Both the stamp and 1970 may be what they count from, as the clock is near 1970.
+    #[error(
+        "the times in field {field} may count from the stamp or from the begin of the clock, which are too near each other to          tell; --times {field}:UNIT:FROM says which"
+    )]
+    TwoOrigins {
+        /// The field.
+        field: String,
+    },
     /// The numbers are those of a sweep in no unit.
     #[error(
         "field {field} runs from {first} to {last}: that is a sweep of 1 ms to 1 s in none of s, ms, us, ns; \

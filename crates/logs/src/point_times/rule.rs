@@ -13,6 +13,8 @@ const SWEEP_MAX_NS: f64 = 1e9;
 /// Times this far from the stamp are those of its sweep, nanoseconds: the longest sweep, and half of one more for a
 /// stamp that is taken when a message is sent.
 const FROM_STAMP_MAX_NS: i64 = 1_500_000_000;
+/// Of two origins the nearer one is taken where they differ by more than this share of the sweep.
+const ORIGINS_APART: f64 = 0.2;
 /// Share of points that may be older than the one before them of the same laser: second returns are.
 const DESCENTS_MAX: f64 = 0.01;
 
@@ -88,7 +90,18 @@ impl TimesRule {
             counted().all(|(&time, _)| time.saturating_sub(origin_ns).saturating_abs() <= FROM_STAMP_MAX_NS)
         };
         let mut doubts = Vec::new();
-        let from = if is_near(0) {
+        let from = if is_near(0) && is_near(cloud.stamp_ns) {
+            // A simulated clock begins at 0. A sweep begins or ends at its stamp, or the stamp lies in it.
+            let (first_ns, last_ns) =
+                counted().fold((i64::MAX, i64::MIN), |(a, b), (&time, _)| (a.min(time), b.max(time)));
+            let off_ns = |origin_ns: i64| (first_ns - origin_ns).max(origin_ns - last_ns).max(0);
+            let (off_stamp_ns, off_epoch_ns) = (off_ns(0), off_ns(cloud.stamp_ns));
+            let least_ns = ORIGINS_APART * (last_ns - first_ns) as f64;
+            if cloud.stamp_ns != 0 && ((off_stamp_ns - off_epoch_ns).abs() as f64) < least_ns {
+                return Err(NoTimes::TwoOrigins { field: field() });
+            }
+            if off_stamp_ns <= off_epoch_ns { TimesFrom::Stamp } else { TimesFrom::Epoch }
+        } else if is_near(0) {
             TimesFrom::Stamp
         } else if is_near(cloud.stamp_ns) {
             TimesFrom::Epoch

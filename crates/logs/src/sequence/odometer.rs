@@ -1,7 +1,7 @@
 //! Guesses by odometry.
 
 use super::logged_scan::LoggedScan;
-use mrol_map::geometry::Pose;
+use mrol_map::geometry::{Pose, is_finite};
 use mrol_map::mapping::Guess;
 
 /// The way of the sensor since its last accepted scan, as its odometry tells.
@@ -15,7 +15,8 @@ impl Odometer {
     /// The guess of a scan: the motion since the last accepted scan. None where the odometry does not tell one.
     pub fn guess(&self, scan: &LoggedScan) -> Option<Guess> {
         let (last, now) = (self.last?, scan.odometry_from_sensor?);
-        Some(Guess::Motion(last.inv_mul(&now)))
+        // Of poses as far away as numbers go, the motion is none.
+        Some(last.inv_mul(&now)).filter(is_finite).map(Guess::Motion)
     }
 
     /// Notes a scan that the map accepted: the next guess counts from it.
@@ -43,6 +44,8 @@ mod tests {
         // The one at 2 m was refused.
         assert_eq!(odometer.guess(&scan(Some(3.0))), Some(Guess::Motion(Pose::translation(2.0, 0.0, 0.0))));
         assert_eq!(odometer.guess(&scan(None)), None);
+        odometer.accepted(&scan(Some(-1e308)));
+        assert_eq!(odometer.guess(&scan(Some(1e308))), None, "no number is so far");
         odometer.accepted(&scan(None));
         assert_eq!(odometer.guess(&scan(Some(4.0))), None, "from where it went on is not known");
     }

@@ -47,6 +47,8 @@ pub struct Sequence {
     rule: Option<TimesRule>,
     first_stamp_ns: Option<i64>,
     last_stamp_ns: Option<i64>,
+    /// No scan was given out yet.
+    is_first: bool,
     /// Clouds within the wanted time so far.
     clouds: u64,
     notes: Notes,
@@ -77,6 +79,7 @@ impl Sequence {
             log_time_ns: 0,
             first_stamp_ns: None,
             last_stamp_ns: None,
+            is_first: true,
             clouds: 0,
             notes: Notes::default(),
         }
@@ -124,6 +127,12 @@ impl Sequence {
         });
         let gravity = self.plan.gravity.as_ref();
         let gravity = gravity.and_then(|source| self.accelerations.at(stamp_ns, &source.sensor_from_imu));
+        if std::mem::take(&mut self.is_first) && gravity.is_none() && self.plan.gravity.is_some() {
+            self.notes.note("gravity", || {
+                "the first cloud has no gravity: in the 0.2 s before it there is no acceleration, or one that is not 1 g;                  the map leans as the sensor did"
+                    .to_owned()
+            });
+        }
         let times_s = self.times_s(&cloud).map_or_else(
             |why| {
                 self.notes.note("times", || {

@@ -39,6 +39,8 @@ pub struct TopicSummary {
     pub child_frame: Option<String>,
     /// Stamp of its first message, nanoseconds.
     pub first_stamp_ns: Option<i64>,
+    /// Checksum of its first message: two logs whose clocks begin at 0 differ in it.
+    pub first_checksum: Option<u32>,
     /// Of clouds: how the times of points are read, and what is odd about it, or why there are none.
     pub times: Option<Result<(TimesRule, Vec<String>), String>>,
     /// Why the first message that cannot be read cannot.
@@ -56,6 +58,7 @@ impl TopicSummary {
             frame: None,
             child_frame: None,
             first_stamp_ns: None,
+            first_checksum: None,
             times: None,
             unreadable: None,
         }

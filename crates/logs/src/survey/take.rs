@@ -79,6 +79,7 @@ impl LogSurvey {
         let header = Header::read(&mut Cursor::new(message.data)?)?;
         if summary.first_stamp_ns.is_none() {
             summary.first_stamp_ns = Some(header.stamp_ns);
+            summary.first_checksum = Some(crc32fast::hash(message.data));
             summary.frame = Some(header.frame.to_owned());
         }
         match kind {

@@ -3,7 +3,7 @@
 use super::support::{CdrWriter, DRIVERS, Driver};
 use mrol_logs::cloud::{Cloud, CloudError};
 use mrol_logs::message::MessageKind;
-use mrol_logs::point_times::{NoTimes, TimesRule};
+use mrol_logs::point_times::{NoTimes, TimesFrom, TimesRule};
 use mrol_map::geometry::Point;
 use proptest::prelude::*;
 
@@ -74,6 +74,22 @@ fn what_is_no_sweep_is_told() {
     assert!(message.contains("field time") && message.contains("--times time:UNIT:FROM"), "{message}");
     let cloud = read(&DRIVERS[1], &[Point::new(f32::NAN, 0.0, 0.0)], &[0.0]);
     assert_eq!(TimesRule::find(&cloud, cloud.times.as_ref().unwrap()), Err(NoTimes::NoReturns));
+}
+
+#[test]
+fn where_a_clock_begins_times_count_from_what_fits_them_or_are_not_used() {
+    const MS: i64 = 1_000_000;
+    let found = |stamp_ms: i64, times_s: &[f32]| {
+        let cloud = Cloud { stamp_ns: stamp_ms * MS, ..with_times(times_s) };
+        TimesRule::find(&cloud, cloud.times.as_ref().unwrap()).map(|(rule, _)| rule.from)
+    };
+    // Of a simulated clock: sweeps of 0.1 s that begin at their stamps, by the same clock and from the stamp.
+    assert_eq!(found(500, &[0.5, 0.55, 0.6]), Ok(TimesFrom::Epoch));
+    assert_eq!(found(100, &[0.1, 0.15, 0.2]), Ok(TimesFrom::Epoch));
+    assert_eq!(found(500, &[0.0, 0.05, 0.1]), Ok(TimesFrom::Stamp));
+    assert_eq!(found(0, &[0.0, 0.05, 0.1]), Ok(TimesFrom::Stamp));
+    // One that ends at its stamp by the clock, or begins there.
+    assert!(matches!(found(100, &[0.0, 0.05, 0.1]), Err(NoTimes::TwoOrigins { .. })));
 }
 
 #[test]

@@ -245,6 +245,22 @@ fn odometry_of_a_topic_needs_to_know_where_the_sensor_is() {
 }
 
 #[test]
+fn a_first_cloud_without_the_gravity_that_was_announced_is_told() {
+    let said = |stamp_ns: i64| {
+        let mut robot = Robot::new();
+        let imu_topic = robot.log.topic("/imu", "sensor_msgs/msg/Imu");
+        robot.put(imu_topic, 0, &imu(stamp_ns, "lidar", [0.0, 0.0, 9.81]));
+        (0..3).for_each(|k| robot.cloud(100 * k + 50, 100 * k + 50));
+        let (scans, notes) = scans(&robot.log.finish(), &Choice::default(), SequenceOptions::default());
+        let told = notes.iter().any(|note| note.contains("first cloud has no gravity"));
+        (scans[0].gravity.is_some(), told)
+    };
+    assert_eq!(said(START_NS), (true, false));
+    // By a clock of its own.
+    assert_eq!(said(START_NS - 86_400_000 * MS), (false, true));
+}
+
+#[test]
 fn a_hostile_log_neither_grows_nor_hangs() {
     let mut robot = Robot::new();
     // A circle, long names, and a jump by a year.
