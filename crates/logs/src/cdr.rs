@@ -29,6 +29,14 @@ pub enum CdrError {
     /// A string that is not UTF-8.
     #[error("a string at byte {0} is not UTF-8")]
     Utf8(usize),
+    /// A frame's name that is longer than any that is read.
+    #[error("the name of its frame has {len} bytes, and {max} are read")]
+    FrameName {
+        /// Bytes of the name.
+        len: usize,
+        /// Bytes that are read, at most.
+        max: usize,
+    },
 }
 
 /// A cursor over the values of a message. Values are aligned by their size, from the end of the encapsulation header

@@ -19,7 +19,7 @@ impl Display for Seconds {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadTransform {
     /// Numbers that are no pose.
-    #[error("the transform from {child} to {parent} has numbers that are no pose")]
+    #[error("the transform from {child:?} to {parent:?} has numbers that are no pose")]
     NoPose {
         /// The parent.
         parent: String,
@@ -99,6 +99,11 @@ pub enum NoTransform {
 }
 
 impl BadTransform {
+    /// That the numbers of a transform are no pose; its names, which nobody looked at, are cut.
+    pub(crate) fn no_pose(parent: &str, child: &str) -> Self {
+        Self::NoPose { parent: excerpt(parent), child: excerpt(child) }
+    }
+
     pub(super) fn name(name: &str) -> Self {
         Self::Name { len: name.len(), begin: excerpt(name) }
     }

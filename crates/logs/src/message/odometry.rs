@@ -1,6 +1,6 @@
 //! `nav_msgs/Odometry`.
 
-use super::header::{Header, plain_frame};
+use super::header::{Header, bounded, plain_frame};
 use super::transforms::pose_of;
 use crate::cdr::{CdrError, Cursor};
 use mrol_map::geometry::Pose;
@@ -20,11 +20,11 @@ impl<'a> Odometry<'a> {
     /// Reads a message.
     ///
     /// # Errors
-    /// When it is cut off, or no CDR.
+    /// When it is cut off, or no CDR, or a frame's name is longer than those of [frames](crate::frames).
     pub fn read(message: &'a [u8]) -> Result<Self, CdrError> {
         let mut cursor = Cursor::new(message)?;
         let header = Header::read(&mut cursor)?;
-        let child_frame = plain_frame(cursor.string()?);
+        let child_frame = bounded(plain_frame(cursor.string()?))?;
         let pose = pose_of(&mut cursor)?;
         Ok(Self { header, child_frame, pose })
     }

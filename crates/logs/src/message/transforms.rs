@@ -18,7 +18,7 @@ pub struct StampedTransform<'a> {
 /// Least bytes of a transform: a time, two strings, seven numbers.
 const TRANSFORM_BYTES: usize = 8 + 4 + 4 + 7 * 8;
 
-/// The transforms of a message.
+/// The transforms of a message. Their frames have names of any length: a bad one spoils no other transform.
 ///
 /// # Errors
 /// When it is cut off, or no CDR.
@@ -26,7 +26,7 @@ pub fn transforms(message: &[u8]) -> Result<Vec<StampedTransform<'_>>, CdrError>
     let mut cursor = Cursor::new(message)?;
     let count = cursor.count(TRANSFORM_BYTES)?;
     let mut transform = || {
-        let header = Header::read(&mut cursor)?;
+        let header = Header::read_of_any_frame(&mut cursor)?;
         let child_frame = plain_frame(cursor.string()?);
         let parent_from_child = pose_of(&mut cursor)?;
         Ok(StampedTransform { header, child_frame, parent_from_child })

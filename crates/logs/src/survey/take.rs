@@ -109,7 +109,7 @@ impl LogSurvey {
         for transform in transforms(data)? {
             let (parent, child) = (transform.header.frame, transform.child_frame);
             let noted = match transform.parent_from_child {
-                None => Err(BadTransform::NoPose { parent: parent.to_owned(), child: child.to_owned() }),
+                None => Err(BadTransform::no_pose(parent, child)),
                 Some(pose) if is_static => {
                     self.fixed.fix(parent, child, pose).and_then(|()| self.frames.fix(parent, child, pose))
                 }
