@@ -75,8 +75,8 @@ impl LogFile {
         Ok((file, scans))
     }
 
-    /// A name of this log's scans that another log hardly has, and a copy of it has: of the topic, its first stamp and its
-    /// first message.
+    /// A name of this log's scans that another log hardly has, and a copy of it has: of the topic, its first stamp and
+    /// its first message.
     pub(crate) fn session(&self, scans: &LogScans) -> String {
         let summary = &self.survey.topics[scans.cloud];
         let topic: String = summary.topic.name.chars().filter(char::is_ascii_alphanumeric).take(20).collect();
