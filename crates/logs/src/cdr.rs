@@ -29,8 +29,10 @@ pub enum CdrError {
     /// A string that is not UTF-8.
     #[error("a string at byte {0} is not UTF-8")]
     Utf8(usize),
-    /// A frame's name that is longer than any that is read.
-    #[error("the name of its frame has {len} bytes, and {max} are read")]
+    /// A frame's name that is longer than any that is read, or cannot be told.
+    #[error(
+        "the name of its frame has {len} bytes; names of {max} bytes without control characters are read"
+    )]
     FrameName {
         /// Bytes of the name.
         len: usize,

@@ -130,7 +130,8 @@ impl LogSending<'_> {
         }
         if let Some(done_ns) = self.done_ns.filter(|_| taken > 0) {
             return Err(CliError::failed(format!(
-                "{}: the map has the cloud of {} in session {}, which these options do not take, so that nothing is known                  to be new: start it with the options of before, or with another --session",
+                "{}: the map has the cloud of {} in session {}, which these options do not take, so that \
+                 nothing is known to be new: start it with the options of before, or with another --session",
                 self.path.display(),
                 name_of_stamp(done_ns),
                 self.session

@@ -11,6 +11,14 @@ pub enum CloudError {
     /// The message is of a kind without points.
     #[error("the message has no points")]
     NoCloud,
+    /// There are too many points.
+    #[error("the cloud has {points} points, and {max} are read")]
+    TooMany {
+        /// Points of the cloud.
+        points: usize,
+        /// Points that are read, at most.
+        max: usize,
+    },
     /// A field is missing.
     #[error("the cloud has no field {missing}, only {fields}")]
     FieldMissing {
@@ -20,10 +28,10 @@ pub enum CloudError {
         fields: String,
     },
     /// A field is of a type that ROS does not define.
-    #[error("field {0} is of an unknown type")]
+    #[error("field {0:?} is of an unknown type")]
     FieldType(String),
     /// A field ends behind its point.
-    #[error("field {name} ends at byte {end} of a point, and a point has {point_step} bytes (point_step)")]
+    #[error("field {name:?} ends at byte {end} of a point, and a point has {point_step} bytes (point_step)")]
     FieldOutside {
         /// Its name.
         name: String,

@@ -3,6 +3,7 @@
 use super::error::CloudError;
 use super::raw_cloud::TimeValues;
 use crate::message::{FieldType, PointCloud2, PointField};
+use mrol_map::util::excerpt;
 
 /// Where the points of a cloud are in its data: looked at once, so that reading them cannot fail.
 #[derive(Debug, Clone, Copy)]
@@ -66,10 +67,10 @@ impl FieldColumn {
     /// # Errors
     /// When the field is of no known type, or does not lie within a point.
     pub(super) fn of(cloud: &PointCloud2<'_>, field: &PointField<'_>) -> Result<Self, CloudError> {
-        let field_type = field.field_type.ok_or_else(|| CloudError::FieldType(field.name.to_owned()))?;
+        let field_type = field.field_type.ok_or_else(|| CloudError::FieldType(excerpt(field.name)))?;
         let end = u64::from(field.offset) + field_type.bytes() as u64;
         if end > u64::from(cloud.point_step) {
-            let name = field.name.to_owned();
+            let name = excerpt(field.name);
             return Err(CloudError::FieldOutside { name, end, point_step: cloud.point_step });
         }
         Ok(Self { offset: field.offset as usize, field_type, is_big_endian: cloud.is_big_endian })

@@ -2,7 +2,7 @@
 
 use super::error::CloudError;
 use super::field_column::{FieldColumn, PointLayout};
-use super::raw_cloud::{Cloud, RawTimes};
+use super::raw_cloud::{Cloud, RawTimes, check_points};
 use crate::message::PointCloud2;
 use mrol_map::geometry::Point;
 use mrol_map::util::excerpt;
@@ -28,6 +28,7 @@ impl Cloud {
         time_field: Option<&str>,
     ) -> Result<Self, CloudError> {
         let layout = PointLayout::of(message)?;
+        check_points(layout.len())?;
         let column = |name: &str| {
             let field = message.field(name).ok_or_else(|| missing(name, message))?;
             FieldColumn::of(message, field)

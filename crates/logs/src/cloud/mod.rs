@@ -9,4 +9,4 @@ mod raw_cloud;
 
 pub use error::CloudError;
 pub use from_point_cloud2::TIME_FIELDS;
-pub use raw_cloud::{Cloud, RawTimes, TimeValues};
+pub use raw_cloud::{Cloud, POINTS_MAX, RawTimes, TimeValues};

@@ -4,6 +4,9 @@ use super::error::CloudError;
 use crate::message::{FieldType, LaserScan, LivoxCloud, MessageKind, PointCloud2};
 use mrol_map::geometry::Point;
 
+/// Points of a cloud, at most: as many as a server takes of a scan by default.
+pub const POINTS_MAX: usize = 2_000_000;
+
 /// The points of a message, in the order in which it has them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
@@ -44,15 +47,28 @@ impl Cloud {
     /// of the first field that is [known](super::TIME_FIELDS) to have some.
     ///
     /// # Errors
-    /// When the message is cut off, or its fields do not lie within its data.
+    /// When the message is cut off, its fields do not lie within its data, or it has more than [`POINTS_MAX`] points.
     pub fn read(kind: MessageKind, message: &[u8], time_field: Option<&str>) -> Result<Self, CloudError> {
         match kind {
             MessageKind::PointCloud2 => Self::of_point_cloud2(&PointCloud2::read(message)?, time_field),
-            MessageKind::Livox => Ok(Self::of_livox(&LivoxCloud::read(message)?)),
-            MessageKind::LaserScan => Ok(Self::of_laser_scan(&LaserScan::read(message)?)),
+            MessageKind::Livox => {
+                let cloud = LivoxCloud::read(message)?;
+                check_points(cloud.points.len())?;
+                Ok(Self::of_livox(&cloud))
+            }
+            MessageKind::LaserScan => {
+                let scan = LaserScan::read(message)?;
+                check_points(scan.ranges_m.len())?;
+                Ok(Self::of_laser_scan(&scan))
+            }
             MessageKind::Transforms | MessageKind::Odometry | MessageKind::Imu => Err(CloudError::NoCloud),
         }
     }
+}
+
+/// Refuses a cloud of so many points, if that is too many: points of a byte each would take forty times their message.
+pub(super) fn check_points(points: usize) -> Result<(), CloudError> {
+    if points > POINTS_MAX { Err(CloudError::TooMany { points, max: POINTS_MAX }) } else { Ok(()) }
 }
 
 impl TimeValues {

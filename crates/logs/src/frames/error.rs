@@ -44,6 +44,9 @@ pub enum BadTransform {
         /// The child.
         child: String,
     },
+    /// There are too many frames between it and the root.
+    #[error("frame {0} is left out: there are {max} frames above it, which is the most", max = super::DEPTH_MAX)]
+    TooDeep(String),
     /// There are too many frames.
     #[error("frame {0} is left out: there are {max} frames, which is the most", max = super::FRAMES_MAX)]
     TooMany(String),

@@ -6,4 +6,4 @@ mod tree;
 
 pub use error::{BadTransform, NoTransform, Seconds};
 pub use track::{EXTRAPOLATION_MAX_NS, Outside, Track};
-pub use tree::{FRAMES_MAX, FrameTree, NAME_BYTES_MAX};
+pub use tree::{DEPTH_MAX, FRAMES_MAX, FrameTree, NAME_BYTES_MAX};

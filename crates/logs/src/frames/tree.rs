@@ -11,6 +11,8 @@ use mrol_map::util::excerpt;
 pub const FRAMES_MAX: usize = 1000;
 /// Bytes of a frame's name, at most.
 pub const NAME_BYTES_MAX: usize = 256;
+/// Frames from one to the root of its tree, at most: every transform walks there.
+pub const DEPTH_MAX: usize = 64;
 /// Frames that an error lists, at most.
 const FRAMES_LISTED: usize = 12;
 
@@ -74,6 +76,9 @@ impl FrameTree {
             if self.ancestors(parent).any(|ancestor| ancestor == child) {
                 return Err(BadTransform::Circle { parent: parent.to_owned(), child: child.to_owned() });
             }
+            if self.ancestors(parent).count() >= DEPTH_MAX {
+                return Err(BadTransform::TooDeep(child.to_owned()));
+            }
             if !self.links.contains_key(child) && self.links.len() >= FRAMES_MAX {
                 return Err(BadTransform::TooMany(child.to_owned()));
             }
@@ -84,9 +89,10 @@ impl FrameTree {
         self.links.get_mut(child).ok_or_else(|| BadTransform::TooMany(child.to_owned()))
     }
 
-    /// A frame, its parent, and so on up to a root.
+    /// A frame, its parent, and so on up to a root, or until there were as many as may be in a row.
     pub fn ancestors<'a>(&'a self, frame: &'a str) -> impl Iterator<Item = &'a str> {
-        std::iter::successors(Some(frame), |frame| self.links.get(*frame).map(|link| link.parent.as_str()))
+        let parent = |frame: &&str| self.links.get(*frame).map(|link| link.parent.as_str());
+        std::iter::successors(Some(frame), parent).take(DEPTH_MAX)
     }
 
     /// True of a frame that is a child or a parent.
@@ -222,6 +228,16 @@ mod tests {
             let refused = tree.fix(parent, child, x(0.0));
             assert!(matches!(refused, Err(BadTransform::Circle { .. })), "{parent} {child}: {refused:?}");
         }
+        let mut chain = FrameTree::default();
+        let name = |k: usize| format!("f{k:04}");
+        let deep = (0..200).find_map(|k| chain.fix(&name(k), &name(k + 1), x(1.0)).err());
+        assert!(matches!(deep, Some(BadTransform::TooDeep(_))), "{deep:?}");
+        assert_eq!(chain.frames().len(), DEPTH_MAX);
+        // From its leaf up, each parent has no parent yet: what is beyond is not found.
+        let mut chain = FrameTree::default();
+        (0..200).rev().for_each(|k| chain.fix(&name(k), &name(k + 1), x(1.0)).unwrap());
+        assert!(chain.transform(&name(0), &name(200), 0, 0).is_err());
+        assert!(chain.transform(&name(150), &name(200), 0, 0).is_ok());
         let long = "n".repeat(NAME_BYTES_MAX + 1);
         assert!(matches!(tree.fix("a", &long, x(0.0)), Err(BadTransform::Name { len: 257, .. })));
         let refused =

@@ -16,7 +16,7 @@ impl<'a> Header<'a> {
     /// The header at the cursor.
     ///
     /// # Errors
-    /// When the message ends before its end, or the frame's name is longer than those of [frames](crate::frames).
+    /// When the message ends before its end, or the frame's name is not one of [frames](crate::frames).
     pub fn read(cursor: &mut Cursor<'a>) -> Result<Self, CdrError> {
         let header = Self::read_of_any_frame(cursor)?;
         Ok(Self { frame: bounded(header.frame)?, ..header })
@@ -36,10 +36,12 @@ impl<'a> Header<'a> {
     }
 }
 
-/// A frame's name that is short enough to be kept.
+/// A frame's name that is short enough to be kept, and that a terminal may be shown.
 pub(super) fn bounded(frame: &str) -> Result<&str, CdrError> {
     match frame.len() {
-        len if len > NAME_BYTES_MAX => Err(CdrError::FrameName { len, max: NAME_BYTES_MAX }),
+        len if len > NAME_BYTES_MAX || frame.contains(char::is_control) => {
+            Err(CdrError::FrameName { len, max: NAME_BYTES_MAX })
+        }
         _ => Ok(frame),
     }
 }

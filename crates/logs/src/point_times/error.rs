@@ -28,7 +28,8 @@ pub enum NoTimes {
     },
     /// Both the stamp and 1970 may be what they count from, as the clock is near 1970.
     #[error(
-        "the times in field {field} may count from the stamp or from the begin of the clock, which are too near each other to          tell; --times {field}:UNIT:FROM says which"
+        "the times in field {field} may count from the stamp or from the begin of the clock, which are too near each \
+         other to tell; --times {field}:UNIT:FROM says which"
     )]
     TwoOrigins {
         /// The field.

@@ -129,7 +129,8 @@ impl Sequence {
         let gravity = gravity.and_then(|source| self.accelerations.at(stamp_ns, &source.sensor_from_imu));
         if std::mem::take(&mut self.is_first) && gravity.is_none() && self.plan.gravity.is_some() {
             self.notes.note("gravity", || {
-                "the first cloud has no gravity: in the 0.2 s before it there is no acceleration, or one that is not 1 g;                  the map leans as the sensor did"
+                "the first cloud has no gravity: in the 0.2 s before it there is no acceleration, or one that is not 1 g; \
+                 the map leans as the sensor did"
                     .to_owned()
             });
         }

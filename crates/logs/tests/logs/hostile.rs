@@ -1,7 +1,9 @@
 //! Small logs that ask for much memory, time or space on a terminal get little of each, with a word.
 
 use super::support::{CdrWriter, McapWriter, odometry, transforms};
+use mrol_logs::cloud::{Cloud, CloudError};
 use mrol_logs::log::McapReader;
+use mrol_logs::message::MessageKind;
 use mrol_logs::survey::LogSurvey;
 use mrol_map::geometry::Pose;
 
@@ -56,4 +58,17 @@ fn names_of_frames_that_are_too_long_are_neither_kept_nor_printed() {
     }
     assert_eq!(survey.refused_transforms.len(), 1);
     assert!(survey.refused_transforms[0].len() < 400, "{} bytes", survey.refused_transforms[0].len());
+}
+
+#[test]
+fn clouds_of_more_points_than_a_server_takes_and_frames_that_no_terminal_may_be_shown_are_told() {
+    let read = |points: usize| Cloud::read(MessageKind::PointCloud2, &cloud(0, "lidar", points), None);
+    assert_eq!(read(2_000_000).unwrap().points.len(), 2_000_000);
+    assert_eq!(read(2_000_001), Err(CloudError::TooMany { points: 2_000_001, max: 2_000_000 }));
+    let mut log = McapWriter::default();
+    let topic = log.topic("/a", CLOUD);
+    log.message(topic, 0, &cloud(0, "\x1b[2Jlidar", 1));
+    let survey = survey(&log.finish());
+    assert_eq!(survey.topics[0].frame, None);
+    assert!(survey.topics[0].unreadable.as_ref().is_some_and(|why| why.contains("control characters")));
 }
