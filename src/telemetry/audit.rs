@@ -1,4 +1,5 @@
-//! The audit: a log line for each change by an operator, for each scan that carved, and for each key that was refused.
+//! The audit: a log line for each change by an operator, for each scan that carved, for each key that was refused, and
+//! where a robot's scans begin and cease to be refused.
 //!
 //! Lines have the target [`AUDIT`] and lie within the request's span, which says the protocol, the request id, the key
 //! and the peer.
@@ -9,6 +10,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 
+use super::refused_robots::RefusedRobots;
+use mrol_map::map::MapName;
 use mrol_service::{Change, End, Ended, JudgedScan, MapVersion, Observer, Outcome, Reason};
 
 /// The target of the audit's lines.
@@ -20,6 +23,9 @@ const REFUSALS_PER_S_MAX: NonZeroU32 = NonZeroU32::new(10).expect("not zero");
 
 /// Operations whose refusal and failure are lines of their own; those that are done tell by their outcome.
 const CHANGES: [&str; 6] = ["CreateMap", "RenameMap", "DeleteMap", "RestoreMap", "DeleteVoxels", "Undo"];
+
+/// Operations after which a name is another map's, or none's.
+const ANOTHER_MAP: [&str; 3] = ["RenameMap", "DeleteMap", "RestoreMap"];
 
 /// Reasons for which somebody is not let in whose key is known.
 const OF_KNOWN_KEYS: [&str; 5] =
@@ -40,6 +46,9 @@ struct Kinds {
     failed: Refusals,
     /// Changes whose callers went away.
     gone: Refusals,
+    /// Robots whose scans began to be refused.
+    scans: Refusals,
+    refused_robots: RefusedRobots,
 }
 
 #[derive(Debug)]
@@ -94,17 +103,53 @@ fn write_change(operation: &str, map: Option<&str>, change: &Change, robot: Opti
     );
 }
 
-/// Writes changes of maps, done, failed or left by their callers.
+impl Kinds {
+    /// Writes the first of a robot's scans that is refused, and the first that is accepted after it.
+    fn write_scan(&self, map: Option<&MapName>, scan: &JudgedScan) {
+        let Some(map) = map else { return };
+        let JudgedScan { robot, session, scan_id, verdict, refusal, overlap, .. } = scan;
+        let (operation, verdict) = ("InsertScan", verdict.as_str());
+        let (map_name, robot_name, session) = (map.as_str(), robot.as_str(), session.as_str());
+        match refusal {
+            Some(reason) if self.refused_robots.refused(map, robot) => {
+                if let Some(unwritten) = self.scans.to_write() {
+                    tracing::info!(
+                        target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id, verdict,
+                        overlap, reason, outcome = "refused", unwritten, "scan"
+                    );
+                }
+            }
+            Some(_) => {}
+            None => {
+                if let Some(row) = self.refused_robots.accepted(map, robot) {
+                    tracing::info!(
+                        target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id,
+                        scans_refused = row.scans, seconds = row.since.elapsed().as_secs_f64(),
+                        outcome = "accepted_again", "scan"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Writes changes of maps, done, failed or left by their callers, and the begin and end of refusals.
 impl Observer for Audit {
     fn operation_ended(&self, ended: &Ended<'_>) {
         let Ended { operation, map, end, .. } = ended;
         let map = map.map(|map| map.as_str());
         match end {
             End::Done(Outcome::Changed(change)) | End::DoneUnheard(change) => {
+                if let (Some(map), true) = (ended.map, ANOTHER_MAP.contains(operation)) {
+                    self.0.refused_robots.forget(map);
+                }
                 write_change(operation, map, change, None);
             }
-            End::Done(Outcome::Scan(JudgedScan { robot, carved: Some(change), .. })) => {
-                write_change(operation, map, change, Some(robot.as_str()));
+            End::Done(Outcome::Scan(scan)) if !scan.replayed => {
+                self.0.write_scan(ended.map, scan);
+                if let JudgedScan { robot, carved: Some(change), .. } = scan {
+                    write_change(operation, map, change, Some(robot.as_str()));
+                }
             }
             End::Done(_) => {}
             End::Failed(error) if CHANGES.contains(operation) => {

@@ -6,6 +6,7 @@ mod families;
 mod log;
 mod map_counters;
 mod metrics;
+mod refused_robots;
 mod requests;
 
 pub use self::audit::{AUDIT, Audit};

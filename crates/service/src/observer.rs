@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::error::ServiceError;
 use super::request::{DeletionAnswer, KeepOutAnswer, MapVersion, ScanAnswer, UndoAnswer};
 use mrol_map::align::Verdict;
-use mrol_map::map::{CallerName, Lookup, MapName, RobotName};
+use mrol_map::map::{CallerName, Lookup, MapName, RobotName, SessionName};
 use mrol_map::mapping::Recovered;
 
 /// Told of each operation of a service when it is over.
@@ -66,8 +66,14 @@ pub enum Outcome {
 pub struct JudgedScan {
     /// The robot that sent the scan.
     pub robot: RobotName,
+    /// The run of the robot's software that it is of.
+    pub session: SessionName,
+    /// The robot's own number of it.
+    pub scan_id: Option<u64>,
     /// How it fits.
     pub verdict: Verdict,
+    /// Why the map did not take it, in a sentence; none of a scan that it took.
+    pub refusal: Option<String>,
     /// Fraction of its points in occupied voxels of level 0, before it was added.
     pub overlap: f64,
     /// Time that the alignment took.

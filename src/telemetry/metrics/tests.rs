@@ -3,14 +3,26 @@
 use super::recorder::*;
 use mrol_map::align::Verdict;
 use mrol_map::map::Lookup;
-use mrol_map::map::{MapName, RobotName};
+use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_service::{Change, End, Ended, JudgedScan, MapsAwake, Observer, Outcome};
 use std::time::Duration;
 
 /// A scan that was judged.
 fn judged(robot: &str, verdict: Verdict) -> JudgedScan {
     let (robot, align_time) = (RobotName::new(robot).unwrap(), Duration::from_millis(30));
-    JudgedScan { robot, verdict, overlap: 0.25, align_time, replayed: false, recovered: None, carved: None }
+    let refusal = (verdict != Verdict::Accepted).then(|| "it does not fit".to_owned());
+    JudgedScan {
+        robot,
+        session: SessionName::default(),
+        scan_id: None,
+        verdict,
+        refusal,
+        overlap: 0.25,
+        align_time,
+        replayed: false,
+        recovered: None,
+        carved: None,
+    }
 }
 
 /// Tells `metrics` that something was done to `map`.

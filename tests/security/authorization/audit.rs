@@ -163,6 +163,49 @@ async fn a_scan_that_carves_is_written_with_how_much_it_took_out() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn refusals_of_a_robot_are_written_when_they_begin_and_when_they_end() {
+    let audited = Audited::start(&[]);
+    let key = Some(&audited.operator);
+    let made = json!({"resolution_m": 0.1, "levels": 3});
+    assert_eq!(
+        audited.http(Method::PUT, "/v1/maps/a", "made", key, made).await.status(),
+        StatusCode::CREATED
+    );
+    let guess = json!({"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]});
+    let mut refused = Vec::new();
+    // The first makes the map; one wall leaves two directions open.
+    for (id, points, align) in [
+        (1, wall(2.0), false),
+        (2, wall(2.0), true),
+        (3, wall(2.0), true),
+        (4, wall(2.0), false),
+        (5, wall(2.0), true),
+    ] {
+        let scan = json!({"robot": "r1", "session": "s", "scan_id": id, "points": points, "align": align, "guess": guess,
+                          "gravity": [0, 0, -1]});
+        let answer = audited.http(Method::POST, "/v1/maps/a/scans", &id.to_string(), key, scan).await;
+        let answer: Value = answer.json().await.unwrap();
+        if answer["accepted"] == false {
+            refused.push((id, answer["verdict"].clone(), answer["reason"].clone()));
+        }
+    }
+    assert_eq!(refused.iter().map(|(id, ..)| *id).collect::<Vec<_>>(), [2, 3, 5]);
+
+    let lines = audited.ended();
+    let lines: Vec<_> = lines.iter().filter(|line| line["operation"] == "InsertScan").collect();
+    let names = ["map", "robot", "session", "scan_id", "outcome", "verdict", "reason", "scans_refused"];
+    let told: Vec<_> = lines.iter().map(|line| names.map(|name| line[name].clone()).to_vec()).collect();
+    let [first, _, third] = &refused[..] else { unreachable!() };
+    let expected = json!([
+        ["a", "r1", "s", 2, "refused", first.1, first.2, null],
+        ["a", "r1", "s", 4, "accepted_again", null, null, 2],
+        ["a", "r1", "s", 5, "refused", third.1, third.2, null],
+    ]);
+    assert_eq!(json!(told), expected);
+    assert!(lines[1]["seconds"].as_f64().unwrap() > 0.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_line_for_people_says_each_thing_of_its_request_once() {
     let (folder, keyring) = (tempfile::tempdir().unwrap(), Keyring::empty());
     let operator = keyring.add("operator", Scope::Admin, None);

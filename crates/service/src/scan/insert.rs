@@ -22,7 +22,7 @@ impl MapService {
     /// accepted id; `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while
     /// disk or memory is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        let robot = scan.robot.clone();
+        let (robot, session, scan_id) = (scan.robot.clone(), scan.session.clone(), scan.scan_id);
         let work = async {
             self.scans.permit(&scan.robot)?;
             let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
@@ -40,7 +40,10 @@ impl MapService {
         self.observed("InsertScan", Some(map), work, |answer| {
             Outcome::Scan(JudgedScan {
                 robot,
+                session,
+                scan_id,
                 verdict: answer.verdict,
+                refusal: (!answer.accepted).then(|| answer.reason.clone()),
                 overlap: answer.overlap(),
                 align_time: answer.align_time,
                 replayed: answer.replayed,
