@@ -79,6 +79,10 @@ fn serve(data_dir: &str, options: &[&str], level: &str) -> Command {
 
 impl Drop for Process {
     fn drop(&mut self) {
+        // Where a test failed since it ended by itself: by which signal, or with which code.
+        if let (Ok(Some(status)), true) = (self.child.try_wait(), std::thread::panicking()) {
+            eprintln!("the server had ended before the test did: {status}");
+        }
         // Where a test failed before it was stopped.
         let _ = self.child.kill();
         let _ = self.child.wait();
