@@ -23,6 +23,16 @@ pub enum CdrError {
         /// Bytes left.
         left: usize,
     },
+    /// A list that has more elements than are read.
+    #[error("the list {what} has {count} elements, and {max} are read")]
+    TooMany {
+        /// Its name.
+        what: &'static str,
+        /// Its elements.
+        count: usize,
+        /// Elements that are read, at most.
+        max: usize,
+    },
     /// An encapsulation other than plain CDR.
     #[error("its encapsulation is {0:#06x}, and plain CDR (0x0000, 0x0001) is read")]
     Encapsulation(u16),

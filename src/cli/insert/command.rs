@@ -40,7 +40,7 @@ then has the --session and --first-scan-id with which the same command goes on, 
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Insert {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32; or one log of a robot: .mcap
+    /// .f32; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]

@@ -13,14 +13,14 @@ EXAMPLES:
   mrol log run.mcap --cloud /lidar_left    the same for other clouds
   mrol log run.mcap --json | jq .missing
 
-Nothing is changed, and no server is needed. MCAP files of ROS 2 are read, compressed by zstd or lz4 or not, without a
-summary, and up to where they are good.";
+Nothing is changed, and no server is needed. Logs of ROS 2 are read, compressed or not, without a summary, and up to
+where they are good. Databases (.db3) take a program with the feature `bags`, as the released ones are.";
 
 /// Say what a log of a robot has, which of it would be mapped and why, and what is missing
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Log {
-    /// The log: .mcap
+    /// The log: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(value_name = "FILE")]
     log: PathBuf,
     #[command(flatten)]
@@ -35,7 +35,7 @@ impl Log {
         for summary in &file.survey.topics {
             output.print(&TopicLine::of(summary, widths))?;
         }
-        if let Some(damage) = &file.survey.damage {
+        for damage in &file.survey.damages {
             output.print(&DamageLine { damaged: damage.to_string() })?;
         }
         let plan = file.plan(&self.sources)?;
@@ -43,8 +43,8 @@ impl Log {
         for used in plan.uses {
             output.print(&UseLine { used_for: used.purpose, source: used.source, why: used.why })?;
         }
-        for missing in plan.missing.into_iter().chain(file.survey.refused_transforms) {
-            output.print(&MissingLine { missing })?;
+        for missing in plan.missing.iter().chain(file.survey.oddities()) {
+            output.print(&MissingLine { missing: missing.clone() })?;
         }
         Ok(())
     }

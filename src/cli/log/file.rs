@@ -1,18 +1,14 @@
 //! A log's file, and its scans one by one.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use super::options::{LogOptions, SourceOptions};
 use mrol::console::{CliError, Output};
-use mrol_logs::log::McapReader;
+use mrol_logs::log::{Bag, Messages};
 use mrol_logs::sequence::{LoggedScan, Sequence, SequenceOptions};
 use mrol_logs::survey::{LogSurvey, Plan};
 
-/// Bytes that are read from a file at once.
-const BUFFER_BYTES: usize = 1 << 18;
 /// Bytes of the file from one step of the progress bar to the next.
 const STEP_BYTES: u64 = 1 << 20;
 
@@ -30,10 +26,11 @@ impl LogFile {
     /// # Errors
     /// When it cannot be read, or is no log.
     pub(super) fn survey(path: &Path, output: &Output) -> Result<Self, CliError> {
-        let (mut reader, bytes) = open(path)?;
+        let mut bag = Bag::open(path).map_err(|error| in_file(path, error))?;
+        let bytes = bag.bytes();
         let output = output.clone().with_bar_of_bytes(bytes);
         let mut shown = 0;
-        let survey = LogSurvey::take(&mut reader, |read| {
+        let survey = LogSurvey::take(&mut bag, |read| {
             if read >= shown + STEP_BYTES {
                 shown = read;
                 output.advance_to(read);
@@ -67,8 +64,8 @@ impl LogFile {
             output.say(format!("{}: {} ({})", used.purpose, used.source, used.why))?;
         }
         plan.missing.iter().for_each(|missing| output.note(missing));
-        file.survey.refused_transforms.iter().for_each(|refused| output.note(refused));
-        if let Some(damage) = &file.survey.damage {
+        file.survey.oddities().for_each(|oddity| output.note(oddity));
+        for damage in &file.survey.damages {
             output.note(damage);
         }
         let scans = LogScans::new(&file, plan, sequence)?;
@@ -88,7 +85,7 @@ impl LogFile {
 /// The scans of a log, read one by one.
 pub(crate) struct LogScans {
     path: PathBuf,
-    reader: McapReader<BufReader<File>>,
+    bag: Bag,
     sequence: Sequence,
     /// Number of the topic of clouds.
     cloud: usize,
@@ -100,7 +97,7 @@ impl LogScans {
     fn new(file: &LogFile, plan: Plan, options: SequenceOptions) -> Result<Self, CliError> {
         Ok(Self {
             path: file.path.clone(),
-            reader: open(&file.path)?.0,
+            bag: Bag::open(&file.path).map_err(|error| in_file(&file.path, error))?,
             cloud: plan.cloud,
             sequence: Sequence::new(&file.survey, plan, options),
             ready: VecDeque::new(),
@@ -114,7 +111,7 @@ impl LogScans {
     /// When the file cannot be read.
     pub(crate) fn next(&mut self, output: &Output) -> Result<Option<(LoggedScan, u64)>, CliError> {
         while self.ready.is_empty() && !self.is_over {
-            match self.reader.next_message().map_err(|error| in_file(&self.path, error))? {
+            match self.bag.next_message().map_err(|error| in_file(&self.path, error))? {
                 Some(message) => self.sequence.take(&message),
                 None => self.is_over = true,
             }
@@ -126,7 +123,7 @@ impl LogScans {
                 self.sequence.totals().into_iter().for_each(|total| output.note(total));
             }
         }
-        Ok(self.ready.pop_front().map(|scan| (scan, self.reader.position())))
+        Ok(self.ready.pop_front().map(|scan| (scan, self.bag.position())))
     }
 }
 
@@ -134,13 +131,6 @@ impl LogScans {
 pub(crate) fn name_of_stamp(stamp_ns: i64) -> String {
     let (sign, ns) = (if stamp_ns < 0 { "-" } else { "" }, stamp_ns.unsigned_abs());
     format!("{sign}{}.{:03}", ns / 1_000_000_000, ns % 1_000_000_000 / 1_000_000)
-}
-
-fn open(path: &Path) -> Result<(McapReader<BufReader<File>>, u64), CliError> {
-    let file = File::open(path).map_err(|error| in_file(path, error))?;
-    let bytes = file.metadata().map_err(|error| in_file(path, error))?.len();
-    let reader = McapReader::new(BufReader::with_capacity(BUFFER_BYTES, file));
-    Ok((reader.map_err(|error| in_file(path, error))?, bytes))
 }
 
 fn in_file(path: &Path, problem: impl std::fmt::Display) -> CliError {

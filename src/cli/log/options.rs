@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrol::console::{CliError, parse};
+use mrol_logs::log::Bag;
 use mrol_logs::point_times::TimesOption;
 use mrol_logs::sequence::SequenceOptions;
 use mrol_logs::survey::Choice;
@@ -48,9 +49,6 @@ pub(super) struct SourceOptions {
     extrinsics: Option<Pose>,
 }
 
-/// The ending of logs.
-const ENDING: &str = "mcap";
-
 /// Largest number of seconds of an option: thirty years.
 const SECONDS_MAX: f64 = 1e9;
 
@@ -60,9 +58,7 @@ impl LogOptions {
     /// # Errors
     /// When there is a log and something else, or an option of logs and no log.
     pub(crate) fn path_among<'a>(&self, paths: &'a [PathBuf]) -> Result<Option<&'a Path>, CliError> {
-        let is_log =
-            |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING));
-        match (paths.iter().find(|path| is_log(path)), self.first_given()) {
+        match (paths.iter().find(|path| Bag::is_log(path)), self.first_given()) {
             (Some(path), _) if paths.len() > 1 => Err(CliError::usage(format!(
                 "{}: a log is taken alone, and {} files or folders are given",
                 path.display(),

@@ -51,7 +51,7 @@ when --lookup is given.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32; or one log of a robot: .mcap
+    /// .f32; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters

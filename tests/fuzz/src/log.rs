@@ -1,12 +1,12 @@
 //! Logs of robots.
 
-use mrol_logs::log::McapReader;
+use mrol_logs::log::{McapReader, Messages};
 use mrol_logs::sequence::{Sequence, SequenceOptions};
 use mrol_logs::survey::{Choice, LogSurvey, Plan};
 use mrol_map::geometry::Pose;
 
 /// Topics of the log that messages are put into.
-const TOPICS: [(&str, &str); 7] = [
+const TOPICS: [(&str, &str); 9] = [
     ("/points", "sensor_msgs/msg/PointCloud2"),
     ("/livox", "livox_ros_driver2/msg/CustomMsg"),
     ("/scan", "sensor_msgs/msg/LaserScan"),
@@ -14,6 +14,8 @@ const TOPICS: [(&str, &str); 7] = [
     ("/tf_static", "tf2_msgs/msg/TFMessage"),
     ("/odometry", "nav_msgs/msg/Odometry"),
     ("/imu", "sensor_msgs/msg/Imu"),
+    ("/depth", "sensor_msgs/msg/Image"),
+    ("/camera_info", "sensor_msgs/msg/CameraInfo"),
 ];
 /// Bytes of a chunk, at most: the fuzzer bounds what is allocated at once.
 const CHUNK_BYTES_MAX: usize = 8 << 20;

@@ -11,6 +11,20 @@ pub enum CloudError {
     /// The message is of a kind without points.
     #[error("the message has no points")]
     NoCloud,
+    /// An image whose camera is not known.
+    #[error("where its pixels look is not known: there is no CameraInfo")]
+    NoCamera,
+    /// An image whose pixels are no depths.
+    #[error("its pixels are {0:?}, and depths in 16UC1, mono16 and 32FC1 are read")]
+    Encoding(String),
+    /// An image of another size than the camera's.
+    #[error("it has {} x {} pixels, and its CameraInfo says {} x {}", image[0], image[1], camera[0], camera[1])]
+    OtherCamera {
+        /// Width and height of the image.
+        image: [u32; 2],
+        /// Those of the camera.
+        camera: [u32; 2],
+    },
     /// There are too many points.
     #[error("the cloud has {points} points, and {max} are read")]
     TooMany {

@@ -1,7 +1,8 @@
 //! The points of a message.
 
+use super::camera::Camera;
 use super::error::CloudError;
-use crate::message::{FieldType, LaserScan, LivoxCloud, MessageKind, PointCloud2};
+use crate::message::{FieldType, Image, LaserScan, LivoxCloud, MessageKind, PointCloud2};
 use mrol_map::geometry::Point;
 
 /// Points of a cloud, at most: as many as a server takes of a scan by default.
@@ -42,15 +43,30 @@ pub enum TimeValues {
     Floats(Vec<f64>),
 }
 
+/// What has to be known to read a cloud, besides its message.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CloudOptions<'a> {
+    /// The field of the times of points; where none, the first that is [known](super::TIME_FIELDS) to have some.
+    pub time_field: Option<&'a str>,
+    /// The camera of depth images.
+    pub camera: Option<&'a Camera>,
+}
+
 impl Cloud {
-    /// The cloud of a message of a kind [that has one](MessageKind::is_cloud); its times are those of `time_field`, or
-    /// of the first field that is [known](super::TIME_FIELDS) to have some.
+    /// The cloud of a message of a kind [that has one](MessageKind::is_cloud).
     ///
     /// # Errors
-    /// When the message is cut off, its fields do not lie within its data, or it has more than [`POINTS_MAX`] points.
-    pub fn read(kind: MessageKind, message: &[u8], time_field: Option<&str>) -> Result<Self, CloudError> {
+    /// When the message is cut off, its fields do not lie within its data, it has more than [`POINTS_MAX`] points, or is
+    /// an image without depths or without a camera.
+    pub fn read(kind: MessageKind, message: &[u8], options: CloudOptions<'_>) -> Result<Self, CloudError> {
         match kind {
-            MessageKind::PointCloud2 => Self::of_point_cloud2(&PointCloud2::read(message)?, time_field),
+            MessageKind::PointCloud2 => {
+                Self::of_point_cloud2(&PointCloud2::read(message)?, options.time_field)
+            }
+            MessageKind::Image => {
+                let image = Image::read(message)?;
+                Self::of_depth_image(&image, options.camera.ok_or(CloudError::NoCamera)?)
+            }
             MessageKind::Livox => {
                 let cloud = LivoxCloud::read(message)?;
                 check_points(cloud.points.len())?;
@@ -61,7 +77,9 @@ impl Cloud {
                 check_points(scan.ranges_m.len())?;
                 Ok(Self::of_laser_scan(&scan))
             }
-            MessageKind::Transforms | MessageKind::Odometry | MessageKind::Imu => Err(CloudError::NoCloud),
+            MessageKind::CameraInfo | MessageKind::Transforms | MessageKind::Odometry | MessageKind::Imu => {
+                Err(CloudError::NoCloud)
+            }
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::contradiction::{Contradiction, SAME_DEG, SAME_M};
 use super::error::{BadTransform, NoTransform};
 use super::track::{EXTRAPOLATION_MAX_NS, Track};
-use mrol_map::geometry::Pose;
+use mrol_map::geometry::{Pose, pose_difference};
 use mrol_map::util::excerpt;
 
 /// Frames of a tree, at most.
@@ -61,6 +62,34 @@ impl FrameTree {
             Motion::Moving(track) => track.insert(stamp_ns, parent_from_child),
         }
         Ok(())
+    }
+
+    /// What a transform says against what was told before: one that always holds where `fixed` is its pose, or else one
+    /// of a moving frame.
+    pub fn contradiction(&self, parent: &str, child: &str, fixed: Option<&Pose>) -> Option<Contradiction> {
+        let link = self.links.get(child)?;
+        let (before, parent, child) = (link.parent.clone(), parent.to_owned(), child.to_owned());
+        if before != parent {
+            let mut parents = [before, parent];
+            parents.sort();
+            return Some(Contradiction::OtherParent { child, parents });
+        }
+        match (&link.motion, fixed) {
+            (Motion::Fixed(before), Some(now)) => {
+                let (off_m, off_rad) = pose_difference(before, now);
+                let off_deg = off_rad.to_degrees();
+                (off_m > SAME_M || off_deg > SAME_DEG).then_some(Contradiction::Elsewhere {
+                    parent,
+                    child,
+                    off_m,
+                    off_deg,
+                })
+            }
+            (Motion::Moving(_), None) => None,
+            (Motion::Fixed(_), None) | (Motion::Moving(_), Some(_)) => {
+                Some(Contradiction::FixedAndMoving { parent, child })
+            }
+        }
     }
 
     /// The link between two frames, which is made where there is none. A frame that changes its parent forgets where it
@@ -185,7 +214,6 @@ impl FrameTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mrol_map::geometry::pose_difference;
 
     fn x(meters: f64) -> Pose {
         Pose::translation(meters, 0.0, 0.0)
@@ -217,6 +245,29 @@ mod tests {
         tree.fix("sensors", "lidar", x(1.0)).unwrap();
         let apart = tree.transform("base", "lidar", 0, 0).unwrap_err().to_string();
         assert!(apart.contains("not connected") && apart.contains("sensors"), "{apart}");
+    }
+
+    #[test]
+    fn what_two_publishers_say_differently_is_told() {
+        let mut tree = FrameTree::default();
+        assert_eq!(tree.contradiction("base", "lidar", Some(&x(0.5))), None);
+        tree.fix("base", "lidar", x(0.5)).unwrap();
+        // As often as it likes, and rounded.
+        assert_eq!(tree.contradiction("base", "lidar", Some(&x(0.500_01))), None);
+        let elsewhere = tree.contradiction("base", "lidar", Some(&x(0.8))).unwrap();
+        assert!(matches!(elsewhere, Contradiction::Elsewhere { off_m, .. } if (off_m - 0.3).abs() < 1e-9));
+        let turned =
+            Pose::from_parts(x(0.5).translation, nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, 0.1));
+        assert!(tree.contradiction("base", "lidar", Some(&turned)).is_some());
+        assert!(matches!(
+            tree.contradiction("base", "lidar", None),
+            Some(Contradiction::FixedAndMoving { .. })
+        ));
+        let parent = tree.contradiction("camera", "lidar", Some(&x(0.5))).unwrap();
+        assert!(parent.to_string().contains("\"base\" and on \"camera\""), "{parent}");
+        tree.note("odom", "base", 0, x(0.0)).unwrap();
+        assert_eq!(tree.contradiction("odom", "base", None), None);
+        assert!(tree.contradiction("map", "base", None).is_some(), "as two localizations would");
     }
 
     #[test]

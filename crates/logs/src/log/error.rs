@@ -1,5 +1,6 @@
 //! Why a log cannot be read, or not to its end.
 
+use std::fmt::{self, Display, Formatter};
 use std::io;
 
 /// Why a log cannot be read at all.
@@ -8,6 +9,34 @@ pub enum LogError {
     /// The file is no log of this format.
     #[error("this is no MCAP file: it begins with {0:02x?}")]
     NoMcap(Vec<u8>),
+    /// The file is no database of ROS 2.
+    #[error("this is no database of ROS 2: {0}")]
+    NoBag(String),
+    /// A folder without a file of a log.
+    #[error("the folder has no file of a log: {endings} are read")]
+    NoFile {
+        /// The endings of such files.
+        endings: String,
+    },
+    /// A file among others.
+    #[error("{name}: {error}")]
+    InFile {
+        /// Its name.
+        name: String,
+        /// What is wrong with it.
+        error: Box<LogError>,
+    },
+    /// A link in a folder.
+    #[error(
+        "{0} in the folder is a link, and what links lead to is not read: give the folder that has the file"
+    )]
+    Link(String),
+    /// A format that this program was built without.
+    #[error(
+        "databases are read by programs that were built with the feature `bags`, as the released ones are: \
+             cargo install --features bags; or make MCAP of it by `ros2 bag convert`"
+    )]
+    NoDatabases,
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -15,12 +44,32 @@ pub enum LogError {
 
 /// Where and why a log was not read to its end: what came before is good.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the log is good up to byte {at}: {why}")]
+#[error("{} is good up to {at}: {why}", file.as_deref().unwrap_or("the log"))]
 pub struct Damage {
-    /// First byte that was not used.
-    pub at: u64,
+    /// The file, where the log has several.
+    pub file: Option<String>,
+    /// The first that was not used.
+    pub at: Place,
     /// Why.
     pub why: DamageKind,
+}
+
+/// A place in a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// A byte of a file, from 0.
+    Byte(u64),
+    /// A row of a table.
+    Row(i64),
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(at) => write!(f, "byte {at}"),
+            Self::Row(at) => write!(f, "message {at}"),
+        }
+    }
 }
 
 /// Why a log was not read to its end.
@@ -51,6 +100,12 @@ pub enum DamageKind {
     /// What cannot be decompressed, or is not as long as it says.
     #[error("the chunk there cannot be decompressed: {0}")]
     Decompression(String),
+    /// Bytes behind the end of the log, such as those of another one.
+    #[error("the log ends there, and more follows, as if another file was appended: nothing of that is read")]
+    Appended,
+    /// What SQLite says of a database.
+    #[error("{0}")]
+    Database(String),
     /// A record that is not as the format says.
     #[error("the {0} there is not as the format says")]
     Format(&'static str),

@@ -3,7 +3,7 @@
 use crate::message::MessageKind;
 
 /// A topic of a log.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Topic {
     /// Its name.
     pub name: String,
@@ -28,10 +28,18 @@ impl Topic {
 /// A message of a log.
 #[derive(Debug, Clone, Copy)]
 pub struct LogMessage<'a> {
-    /// Number of its topic in [`McapReader::topics`](super::McapReader::topics).
+    /// Number of its topic in [`Messages::topics`](super::Messages::topics).
     pub topic: usize,
     /// When it was recorded, nanoseconds.
     pub log_time_ns: u64,
     /// Its bytes, encoded as the topic says.
     pub data: &'a [u8],
+}
+
+/// Bytes of a topic's name, or of its type's, at most.
+const NAME_BYTES_MAX: usize = 1024;
+
+/// True of a name that can be told: others, and what they name, are left out.
+pub(super) fn is_name(name: &str) -> bool {
+    name.len() <= NAME_BYTES_MAX && !name.contains(char::is_control)
 }

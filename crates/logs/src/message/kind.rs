@@ -9,6 +9,10 @@ pub enum MessageKind {
     Livox,
     /// `sensor_msgs/LaserScan`.
     LaserScan,
+    /// `sensor_msgs/Image`, which has points where its pixels are depths.
+    Image,
+    /// `sensor_msgs/CameraInfo`.
+    CameraInfo,
     /// `tf2_msgs/TFMessage`.
     Transforms,
     /// `nav_msgs/Odometry`.
@@ -26,6 +30,8 @@ impl MessageKind {
             ("sensor_msgs", "PointCloud2") => Self::PointCloud2,
             ("livox_ros_driver2" | "livox_ros_driver", "CustomMsg") => Self::Livox,
             ("sensor_msgs", "LaserScan") => Self::LaserScan,
+            ("sensor_msgs", "Image") => Self::Image,
+            ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs" | "tf", "TFMessage" | "tfMessage") => Self::Transforms,
             ("nav_msgs", "Odometry") => Self::Odometry,
             ("sensor_msgs", "Imu") => Self::Imu,
@@ -33,9 +39,9 @@ impl MessageKind {
         })
     }
 
-    /// True of messages with points.
+    /// True of messages that may have points.
     pub fn is_cloud(self) -> bool {
-        matches!(self, Self::PointCloud2 | Self::Livox | Self::LaserScan)
+        matches!(self, Self::PointCloud2 | Self::Livox | Self::LaserScan | Self::Image)
     }
 }
 
@@ -52,7 +58,7 @@ mod tests {
             assert_eq!(MessageKind::of_type(name), Some(MessageKind::Livox));
         }
         assert_eq!(MessageKind::of_type("tf2_msgs/msg/TFMessage"), Some(MessageKind::Transforms));
-        for name in ["sensor_msgs/msg/Image", "PointCloud2", "", "sensor_msgs/msg/msg/Imu"] {
+        for name in ["sensor_msgs/msg/CompressedImage", "PointCloud2", "", "sensor_msgs/msg/msg/Imu"] {
             assert_eq!(MessageKind::of_type(name), None, "{name}");
         }
     }

@@ -2,7 +2,9 @@
 //!
 //! Messages borrow from the bytes that they are read from.
 
+mod camera_info;
 mod header;
+mod image;
 mod imu;
 mod kind;
 mod laser_scan;
@@ -11,7 +13,9 @@ mod odometry;
 mod point_cloud2;
 mod transforms;
 
+pub use camera_info::CameraInfo;
 pub use header::Header;
+pub use image::Image;
 pub use imu::Imu;
 pub use kind::MessageKind;
 pub use laser_scan::LaserScan;

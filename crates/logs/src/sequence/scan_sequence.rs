@@ -7,7 +7,7 @@ use super::logged_scan::LoggedScan;
 use super::notes::Notes;
 use super::options::SequenceOptions;
 use crate::cdr::{CdrError, Cursor};
-use crate::cloud::Cloud;
+use crate::cloud::{Cloud, CloudOptions};
 use crate::frames::{EXTRAPOLATION_MAX_NS, FrameTree, NoTransform, Seconds, Track};
 use crate::log::{LogMessage, Topic};
 use crate::message::{Header, Imu, MessageKind, Odometry, transforms};
@@ -201,8 +201,11 @@ impl Sequence {
         if !self.is_wanted(header) {
             return Ok(());
         }
-        let time_field = self.options.times.as_ref().map(|times| times.field.as_str());
-        match Cloud::read(kind, message.data, time_field) {
+        let options = CloudOptions {
+            time_field: self.options.times.as_ref().map(|times| times.field.as_str()),
+            camera: self.plan.camera.as_ref(),
+        };
+        match Cloud::read(kind, message.data, options) {
             Ok(cloud) => {
                 self.waiting_points += cloud.points.len();
                 self.waiting.push_back(Waiting { cloud, since_ns: message.log_time_ns });

@@ -21,8 +21,8 @@ pub struct Choice {
 pub enum ChoiceError {
     /// The log has no clouds.
     #[error(
-        "the log has no topic with clouds: sensor_msgs/PointCloud2, sensor_msgs/LaserScan and Livox's CustomMsg in cdr are \
-         read; it has {0}"
+        "the log has no topic with clouds: sensor_msgs/PointCloud2, LaserScan, Image of depths, and Livox's CustomMsg \
+         in cdr are read; it has {0}"
     )]
     NoClouds(String),
     /// There is no such topic of clouds.
@@ -32,6 +32,14 @@ pub enum ChoiceError {
         asked: String,
         /// The topics that have some.
         there: String,
+    },
+    /// Depth images whose camera is not known.
+    #[error("the depth images of {topic} cannot be read: {why}")]
+    Camera {
+        /// The topic.
+        topic: String,
+        /// Why.
+        why: String,
     },
     /// There is neither a topic nor a frame of this name.
     #[error(

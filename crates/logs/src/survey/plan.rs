@@ -3,6 +3,7 @@
 use super::choice::{Choice, ChoiceError};
 use super::odometry_source::OdometrySource;
 use super::summary::{LogSurvey, TopicSummary};
+use crate::cloud::Camera;
 use crate::log::Topic;
 use crate::message::MessageKind;
 use mrol_map::geometry::Pose;
@@ -13,6 +14,8 @@ use mrol_map::util::excerpt;
 pub struct Plan {
     /// Number of the topic of clouds.
     pub cloud: usize,
+    /// The camera, of depth images.
+    pub camera: Option<Camera>,
     /// The frame of the clouds.
     pub sensor_frame: String,
     /// From where the motion between scans is known.
@@ -49,6 +52,9 @@ pub struct Use {
 const PLANAR: &str = "no third dimension: scans in one plane are read, and hardly any of them is accepted, since they do \
                       not determine a pose in space";
 
+/// The topic of a camera beside those of its images.
+const CAMERA_INFO: &str = "camera_info";
+
 /// Topics that an error lists, at most.
 const TOPICS_LISTED: usize = 12;
 
@@ -60,6 +66,7 @@ impl Plan {
     pub fn of(survey: &LogSurvey, choice: &Choice) -> Result<Self, ChoiceError> {
         let (cloud, why) = find_cloud(survey, choice)?;
         let summary = &survey.topics[cloud];
+        let camera = find_camera(survey, summary)?;
         let sensor_frame = summary.frame.clone().unwrap_or_default();
         let Topic { name, type_name, .. } = &summary.topic;
         let source = format!("{name} ({type_name}, frame {:?})", excerpt(&sensor_frame));
@@ -91,7 +98,7 @@ impl Plan {
                 None
             }
         };
-        Ok(Self { cloud, sensor_frame, odometry, gravity, uses, missing })
+        Ok(Self { cloud, camera, sensor_frame, odometry, gravity, uses, missing })
     }
 }
 
@@ -101,7 +108,7 @@ fn find_cloud(survey: &LogSurvey, choice: &Choice) -> Result<(usize, String), Ch
         .topics
         .iter()
         .enumerate()
-        .filter(|(_, summary)| summary.messages > 0 && summary.kind().is_some_and(MessageKind::is_cloud))
+        .filter(|(_, summary)| summary.messages > 0 && summary.has_points())
         .collect();
     let names =
         |topics: &mut dyn Iterator<Item = String>| match topics.take(TOPICS_LISTED).collect::<Vec<_>>() {
@@ -122,9 +129,11 @@ fn find_cloud(survey: &LogSurvey, choice: &Choice) -> Result<(usize, String), Ch
             found.ok_or_else(|| ChoiceError::NoSuchCloud { asked: asked.clone(), there: there() })?;
         return Ok((*k, format!("--cloud {asked}")));
     }
-    let is_planar = |summary: &TopicSummary| summary.kind() == Some(MessageKind::LaserScan);
-    let best =
-        clouds.iter().max_by_key(|(k, summary)| (!is_planar(summary), summary.bytes, std::cmp::Reverse(*k)));
+    let best = clouds.iter().max_by_key(|(k, summary)| {
+        let is_planar = summary.kind() == Some(MessageKind::LaserScan);
+        let is_image = summary.kind() == Some(MessageKind::Image);
+        (!is_planar, !is_image, summary.bytes, std::cmp::Reverse(*k))
+    });
     // There is one, or it would have been refused.
     let k = best.map_or(0, |(k, _)| *k);
     let why = match clouds.len() {
@@ -132,6 +141,24 @@ fn find_cloud(survey: &LogSurvey, choice: &Choice) -> Result<(usize, String), Ch
         more => format!("of {more} topics of clouds it has the most bytes; --cloud names another"),
     };
     Ok((k, why))
+}
+
+/// The camera of a topic of depth images, by the CameraInfo beside it (REP 104); none of other clouds.
+fn find_camera(survey: &LogSurvey, images: &TopicSummary) -> Result<Option<Camera>, ChoiceError> {
+    if images.kind() != Some(MessageKind::Image) {
+        return Ok(None);
+    }
+    let topic = &images.topic.name;
+    let error = |why: String| ChoiceError::Camera { topic: excerpt(topic), why };
+    let name = match topic.rsplit_once('/') {
+        Some((folder, _)) => format!("{folder}/{CAMERA_INFO}"),
+        None => CAMERA_INFO.to_owned(),
+    };
+    let info = survey.topics.iter().find(|summary| summary.topic.name == name);
+    let info = info.and_then(|summary| summary.camera_info.as_ref());
+    let info =
+        info.ok_or_else(|| error(format!("there is no sensor_msgs/CameraInfo at {}", excerpt(&name))))?;
+    Camera::of(info, topic).map(Some).map_err(|why| error(why.to_string()))
 }
 
 fn note_times(summary: &TopicSummary, choice: &Choice, uses: &mut Vec<Use>, missing: &mut Vec<String>) {

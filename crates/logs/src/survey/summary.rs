@@ -1,8 +1,9 @@
 //! The topics and frames of a log.
 
+use crate::cloud::is_depth;
 use crate::frames::FrameTree;
 use crate::log::{Damage, Topic};
-use crate::message::MessageKind;
+use crate::message::{CameraInfo, MessageKind};
 use crate::point_times::TimesRule;
 
 /// The topics and frames of a log, collected from its begin to its end.
@@ -16,10 +17,12 @@ pub struct LogSurvey {
     pub fixed: FrameTree,
     /// Time of the first and of the last message, as recorded, nanoseconds; none of a log without messages.
     pub span_ns: Option<(u64, u64)>,
-    /// Where and why the log ends too early.
-    pub damage: Option<Damage>,
+    /// Where and why files end too early.
+    pub damages: Vec<Damage>,
     /// What is wrong with transforms, each once.
     pub refused_transforms: Vec<String>,
+    /// Where publishers of transforms contradict each other, each once.
+    pub contradictions: Vec<String>,
 }
 
 /// A topic, and what its messages have.
@@ -43,8 +46,19 @@ pub struct TopicSummary {
     pub first_checksum: Option<u32>,
     /// Of clouds: how the times of points are read, and what is odd about it, or why there are none.
     pub times: Option<Result<(TimesRule, Vec<String>), String>>,
+    /// Of images: what their pixels are.
+    pub encoding: Option<String>,
+    /// Of a camera: what is told of it first.
+    pub camera_info: Option<CameraInfo>,
     /// Why the first message that cannot be read cannot.
     pub unreadable: Option<String>,
+}
+
+impl LogSurvey {
+    /// What is wrong with transforms, and where their publishers contradict each other.
+    pub fn oddities(&self) -> impl Iterator<Item = &String> {
+        self.refused_transforms.iter().chain(&self.contradictions)
+    }
 }
 
 impl TopicSummary {
@@ -60,6 +74,8 @@ impl TopicSummary {
             first_stamp_ns: None,
             first_checksum: None,
             times: None,
+            encoding: None,
+            camera_info: None,
             unreadable: None,
         }
     }
@@ -67,6 +83,14 @@ impl TopicSummary {
     /// The kind of its messages, where they are read.
     pub fn kind(&self) -> Option<MessageKind> {
         self.topic.kind()
+    }
+
+    /// True of a topic whose messages have points.
+    pub fn has_points(&self) -> bool {
+        match self.kind() {
+            Some(MessageKind::Image) => self.encoding.as_deref().is_some_and(is_depth),
+            kind => kind.is_some_and(MessageKind::is_cloud),
+        }
     }
 
     /// Messages a second, as recorded; none of fewer than two.

@@ -1,17 +1,16 @@
 //! How a survey is taken: message by message.
 
-use std::io::Read;
-
 use super::summary::{LogSurvey, TopicSummary};
 use crate::cdr::{CdrError, Cursor};
-use crate::cloud::Cloud;
+use crate::cloud::{Cloud, CloudOptions};
 use crate::frames::BadTransform;
-use crate::log::{LogError, LogMessage, McapReader};
-use crate::message::{Header, Imu, MessageKind, Odometry, transforms};
+use crate::log::{LogError, LogMessage, Messages};
+use crate::message::{CameraInfo, Header, Image, Imu, MessageKind, Odometry, transforms};
 use crate::point_times::{NoTimes, TimesRule};
+use mrol_map::util::excerpt;
 
-/// Reasons for which transforms were refused that are kept, at most.
-const REFUSED_MAX: usize = 10;
+/// Reasons for which transforms were refused, and contradictions of them, that are kept, at most.
+const KEPT_MAX: usize = 10;
 /// Clouds of a topic that are looked into for times, at most: the first may have no return.
 const CLOUDS_LOOKED_AT: u64 = 10;
 
@@ -20,7 +19,7 @@ impl LogSurvey {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn take<R: Read>(log: &mut McapReader<R>, mut step: impl FnMut(u64)) -> Result<Self, LogError> {
+    pub fn take(log: &mut impl Messages, mut step: impl FnMut(u64)) -> Result<Self, LogError> {
         let mut survey = Self::default();
         while let Some(message) = log.next_message()? {
             let (topic, log_time_ns) = (message.topic, message.log_time_ns);
@@ -47,7 +46,7 @@ impl LogSurvey {
             step(log.position());
         }
         survey.topics.extend(log.topics()[survey.topics.len()..].iter().cloned().map(TopicSummary::new));
-        survey.damage = log.damage().cloned();
+        survey.damages = log.damages().to_vec();
         Ok(survey)
     }
 
@@ -89,11 +88,17 @@ impl LogSurvey {
             MessageKind::Imu => {
                 Imu::read(message.data)?;
             }
+            MessageKind::Image => {
+                if summary.encoding.is_none() {
+                    summary.encoding = Some(excerpt(Image::read(message.data)?.encoding));
+                }
+            }
+            MessageKind::CameraInfo => note_camera(summary, message.data, &mut self.contradictions)?,
             kind if kind.is_cloud()
                 && summary.messages <= CLOUDS_LOOKED_AT
                 && !matches!(summary.times, Some(Ok(_))) =>
             {
-                match Cloud::read(kind, message.data, None) {
+                match Cloud::read(kind, message.data, CloudOptions::default()) {
                     Ok(cloud) => summary.times = Some(times_of(&cloud)),
                     Err(error) => {
                         summary.unreadable.get_or_insert_with(|| error.to_string());
@@ -108,6 +113,8 @@ impl LogSurvey {
     fn note_transforms(&mut self, data: &[u8], is_static: bool) -> Result<(), CdrError> {
         for transform in transforms(data)? {
             let (parent, child) = (transform.header.frame, transform.child_frame);
+            let fixed = transform.parent_from_child.filter(|_| is_static);
+            let contradiction = self.frames.contradiction(parent, child, fixed.as_ref());
             let noted = match transform.parent_from_child {
                 None => Err(BadTransform::no_pose(parent, child)),
                 Some(pose) if is_static => {
@@ -115,16 +122,43 @@ impl LogSurvey {
                 }
                 Some(pose) => self.frames.note(parent, child, transform.header.stamp_ns, pose),
             };
-            if let Err(error) = noted
-                && self.refused_transforms.len() < REFUSED_MAX
-            {
-                let why = error.to_string();
-                if !self.refused_transforms.contains(&why) {
-                    self.refused_transforms.push(why);
-                }
+            match (noted, contradiction) {
+                (Err(error), _) => note_once(&mut self.refused_transforms, || error.to_string()),
+                (Ok(()), Some(told)) => note_once(&mut self.contradictions, || told.to_string()),
+                (Ok(()), None) => {}
             }
         }
         Ok(())
+    }
+}
+
+/// Keeps what is told of a camera first, and notes when something else is told later.
+fn note_camera(
+    summary: &mut TopicSummary,
+    data: &[u8],
+    contradictions: &mut Vec<String>,
+) -> Result<(), CdrError> {
+    let info = CameraInfo::read(data)?;
+    match &summary.camera_info {
+        None => summary.camera_info = Some(info),
+        Some(first) if *first == info => {}
+        Some(_) => note_once(contradictions, || {
+            let name = excerpt(&summary.topic.name);
+            format!(
+                "{name} changes within the log, and what it tells first counts: later images are mapped askew"
+            )
+        }),
+    }
+    Ok(())
+}
+
+/// Notes a text that was not noted before, while there is room.
+fn note_once(notes: &mut Vec<String>, text: impl FnOnce() -> String) {
+    if notes.len() < KEPT_MAX {
+        let text = text();
+        if !notes.contains(&text) {
+            notes.push(text);
+        }
     }
 }
 

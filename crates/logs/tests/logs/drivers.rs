@@ -1,7 +1,7 @@
 //! Clouds as drivers write them are read bit for bit, with their times.
 
 use super::support::{CdrWriter, DRIVERS, Driver};
-use mrol_logs::cloud::{Cloud, CloudError};
+use mrol_logs::cloud::{Cloud, CloudError, CloudOptions};
 use mrol_logs::message::MessageKind;
 use mrol_logs::point_times::{NoTimes, TimesFrom, TimesRule};
 use mrol_map::geometry::Point;
@@ -24,7 +24,8 @@ fn sweep() -> (Vec<Point>, Vec<f32>) {
 fn read(driver: &Driver, points: &[Point], times_s: &[f32]) -> Cloud {
     let message = (driver.write)(END_NS, "lidar", points, times_s, RINGS);
     let kind = MessageKind::of_type(driver.type_name).unwrap();
-    Cloud::read(kind, &message, None).unwrap_or_else(|error| panic!("{}: {error}", driver.name))
+    Cloud::read(kind, &message, CloudOptions::default())
+        .unwrap_or_else(|error| panic!("{}: {error}", driver.name))
 }
 
 #[test]
@@ -140,7 +141,7 @@ fn claimed(height: u32, width: u32, point_step: u32, row_step: u32, offset: u32,
 
 #[test]
 fn sizes_that_the_data_does_not_have_are_refused_and_named() {
-    let read = |message: &[u8]| Cloud::read(MessageKind::PointCloud2, message, None);
+    let read = |message: &[u8]| Cloud::read(MessageKind::PointCloud2, message, CloudOptions::default());
     let most = 1 << 31;
     for (height, width) in [(1, most), (most, 1), (most, most), (u32::MAX, u32::MAX)] {
         for point_step in [0, 4, 16, u32::MAX] {
@@ -173,7 +174,7 @@ proptest! {
         message[at] = byte;
         message.truncate(cut.index(2 * message.len()));
         let kind = MessageKind::of_type(driver.type_name).unwrap();
-        if let Ok(cloud) = Cloud::read(kind, &message, None) {
+        if let Ok(cloud) = Cloud::read(kind, &message, CloudOptions::default()) {
             prop_assert!(cloud.points.len() <= message.len());
             if let Some(raw) = &cloud.times {
                 prop_assert_eq!(raw.values.len(), cloud.points.len());

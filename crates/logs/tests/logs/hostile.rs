@@ -1,7 +1,7 @@
 //! Small logs that ask for much memory, time or space on a terminal get little of each, with a word.
 
 use super::support::{CdrWriter, McapWriter, odometry, transforms};
-use mrol_logs::cloud::{Cloud, CloudError};
+use mrol_logs::cloud::{Cloud, CloudError, CloudOptions};
 use mrol_logs::log::McapReader;
 use mrol_logs::message::MessageKind;
 use mrol_logs::survey::LogSurvey;
@@ -62,7 +62,9 @@ fn names_of_frames_that_are_too_long_are_neither_kept_nor_printed() {
 
 #[test]
 fn clouds_of_more_points_than_a_server_takes_and_frames_that_no_terminal_may_be_shown_are_told() {
-    let read = |points: usize| Cloud::read(MessageKind::PointCloud2, &cloud(0, "lidar", points), None);
+    let read = |points: usize| {
+        Cloud::read(MessageKind::PointCloud2, &cloud(0, "lidar", points), CloudOptions::default())
+    };
     assert_eq!(read(2_000_000).unwrap().points.len(), 2_000_000);
     assert_eq!(read(2_000_001), Err(CloudError::TooMany { points: 2_000_001, max: 2_000_000 }));
     let mut log = McapWriter::default();

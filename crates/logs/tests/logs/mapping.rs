@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::support::{DRIVERS, Driver, McapWriter, transforms};
-use mrol_logs::log::McapReader;
+use mrol_logs::log::{McapReader, Messages};
 use mrol_logs::sequence::{LoggedScan, Odometer, Sequence, SequenceOptions};
 use mrol_logs::survey::{Choice, LogSurvey, Plan};
 use mrol_map::geometry::{Point, Pose, Twist, pose_difference};

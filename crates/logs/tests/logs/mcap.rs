@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::support::McapWriter;
-use mrol_logs::log::{CHUNK_BYTES_MAX, DamageKind, LogError, McapReader};
+use mrol_logs::log::{CHUNK_BYTES_MAX, DamageKind, LogError, McapReader, Messages};
 
 /// A message: its topic, its time, its bytes.
 type Message = (usize, u64, Vec<u8>);
@@ -23,7 +23,7 @@ fn read(log: &[u8]) -> (Vec<Message>, Option<DamageKind>) {
     }
     assert!(reader.next_message().unwrap().is_none(), "the end stays the end");
     assert!(reader.position() <= log.len() as u64);
-    (messages, reader.damage().map(|damage| damage.why.clone()))
+    (messages, reader.damages().first().map(|damage| damage.why.clone()))
 }
 
 #[test]
@@ -79,6 +79,17 @@ fn a_flipped_byte_ends_the_log_before_its_chunk() {
             }
         }
         assert!(ended > 50 && unharmed > 3, "{ended} ended, {unharmed} unharmed");
+    }
+}
+
+#[test]
+fn another_log_behind_the_end_of_one_is_told_and_not_read() {
+    for log in written_by_others() {
+        let (whole, _) = read(&log);
+        for more in [&log[..], &log[..9], &[0]] {
+            let (messages, damage) = read(&[&log[..], more].concat());
+            assert_eq!((messages.len(), damage), (whole.len(), Some(DamageKind::Appended)));
+        }
     }
 }
 

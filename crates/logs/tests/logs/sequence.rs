@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::support::{DRIVERS, McapWriter, imu, odometry, transforms};
-use mrol_logs::log::McapReader;
+use mrol_logs::log::{McapReader, Messages};
 use mrol_logs::sequence::{LoggedScan, Sequence, SequenceOptions};
 use mrol_logs::survey::{Choice, ChoiceError, LogSurvey, OdometrySource, Plan};
 use mrol_map::geometry::{Point, Pose};
@@ -261,6 +261,25 @@ fn a_first_cloud_without_the_gravity_that_was_announced_is_told() {
 }
 
 #[test]
+fn publishers_that_contradict_each_other_are_told_once_each() {
+    let mut robot = Robot::new();
+    robot.fixed(0, "base", "lidar", 0.5);
+    robot.fixed(1, "base", "lidar", 0.5);
+    for k in 0..50 {
+        robot.fixed(2, "base", "camera", if k % 2 == 0 { 0.1 } else { 0.2 });
+        // Two localizations at once.
+        robot.moved(k, k, 0.0);
+        let other = transforms(START_NS + k * MS, &[("map", "base", x(0.0))]);
+        robot.put(robot.tf, k, &other);
+    }
+    robot.cloud(0, 0);
+    let survey = survey(&robot.log.finish());
+    let told = &survey.contradictions;
+    assert!(told.len() == 2 && told[0].contains("\"map\" and on \"odom\""), "{told:#?}");
+    assert!(told[1].contains("\"camera\" is fixed in \"base\" at two poses, 0.100 m"), "{told:#?}");
+}
+
+#[test]
 fn a_hostile_log_neither_grows_nor_hangs() {
     let mut robot = Robot::new();
     // A circle, long names, and a jump by a year.
@@ -277,7 +296,8 @@ fn a_hostile_log_neither_grows_nor_hangs() {
     let log = robot.log.finish();
     let survey = survey(&log);
     assert_eq!(survey.refused_transforms.len(), 4, "{:?}", survey.refused_transforms);
-    assert!(survey.refused_transforms.iter().all(|why| why.len() < 400));
+    assert!(survey.oddities().all(|why| why.len() < 400));
+    assert_eq!(survey.contradictions, Vec::<String>::new(), "what is refused contradicts nothing");
     let (scans, notes) = scans(&log, &Choice::default(), SequenceOptions::default());
     assert_eq!(scans.len(), 300);
     assert!(scans[5].odometry_from_sensor.is_some(), "the clock came back");

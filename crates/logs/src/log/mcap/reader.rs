@@ -2,15 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read};
+use std::ops::Range;
 
 use super::chunk::{CHUNK_BYTES_MAX, unpack};
 use super::fields::Fields;
-use crate::log::error::{Damage, DamageKind, LogError};
-use crate::log::message::{LogMessage, Topic};
+use crate::log::error::{Damage, DamageKind, LogError, Place};
+use crate::log::message::{Topic, is_name};
+use crate::log::messages::Messages;
 
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
 /// Operation codes of records.
+const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;
 const CHANNEL: u8 = 4;
 const MESSAGE: u8 = 5;
@@ -19,8 +22,6 @@ const DATA_END: u8 = 15;
 
 /// Bytes of a record's operation code and length.
 const RECORD_HEAD: usize = 9;
-/// Bytes of a topic's name, or of its type's, at most.
-const NAME_BYTES_MAX: usize = 1024;
 
 /// Reads the messages of an MCAP file.
 #[derive(Debug)]
@@ -36,12 +37,16 @@ pub struct McapReader<R> {
     content: Vec<u8>,
     /// Where the next of them begins.
     next: usize,
+    /// Where in `content` the message is that was given out last.
+    message: Range<usize>,
     /// Names of types by the numbers of schemas.
     schemas: BTreeMap<u16, String>,
     /// Numbers in `topics` by those of channels.
     channels: BTreeMap<u16, usize>,
     topics: Vec<Topic>,
     damage: Option<Damage>,
+    /// True behind the data: what follows is for readers that jump.
+    is_in_summary: bool,
     is_over: bool,
     bytes_max: usize,
 }
@@ -64,10 +69,12 @@ impl<R: Read> McapReader<R> {
             record: Vec::new(),
             content: Vec::new(),
             next: 0,
+            message: 0..0,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             topics: Vec::new(),
             damage: None,
+            is_in_summary: false,
             is_over: false,
             bytes_max: CHUNK_BYTES_MAX,
         })
@@ -79,50 +86,6 @@ impl<R: Read> McapReader<R> {
         Self { bytes_max, ..self }
     }
 
-    /// The topics that were met so far, in the order in which they were met; their numbers stay.
-    pub fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    /// Bytes of the file that were read.
-    pub fn position(&self) -> u64 {
-        self.position
-    }
-
-    /// Where and why the log was not read to its end, once [`McapReader::next_message`] gave none.
-    pub fn damage(&self) -> Option<&Damage> {
-        self.damage.as_ref()
-    }
-
-    /// The next message; none at the end, and where the log is [damaged](McapReader::damage).
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn next_message(&mut self) -> Result<Option<LogMessage<'_>>, LogError> {
-        loop {
-            if self.is_over {
-                return Ok(None);
-            }
-            let found = match self.next < self.content.len() {
-                true => self.next_of_content(),
-                false => match self.read_record()? {
-                    Ok(()) => continue,
-                    Err(why) => Err(why),
-                },
-            };
-            match found {
-                Ok(Some((topic, log_time_ns, begin, end))) => {
-                    return Ok(Some(LogMessage { topic, log_time_ns, data: &self.content[begin..end] }));
-                }
-                Ok(None) => {}
-                Err(why) => {
-                    self.damage = Some(Damage { at: self.record_at, why });
-                    self.is_over = true;
-                }
-            }
-        }
-    }
-
     /// Reads the next record of the file, and puts what is in it into `content`.
     fn read_record(&mut self) -> Result<Result<(), DamageKind>, LogError> {
         self.record_at = self.position;
@@ -130,14 +93,16 @@ impl<R: Read> McapReader<R> {
         self.next = 0;
         let mut head = [0; RECORD_HEAD];
         if !self.fill(&mut head)? {
-            return Ok(Err(DamageKind::CutOff));
+            return Ok(self.cut_off());
         }
         let (code, len) = parse_head(&head);
-        if code == DATA_END {
+        if code == FOOTER {
             self.is_over = true;
-            return Ok(Ok(()));
+            return self.read_end(len);
         }
-        let is_used = matches!(code, SCHEMA | CHANNEL | MESSAGE | CHUNK);
+        self.is_in_summary |= code == DATA_END;
+        // A summary repeats what was read.
+        let is_used = !self.is_in_summary && matches!(code, SCHEMA | CHANNEL | MESSAGE | CHUNK);
         if is_used && len > self.bytes_max as u64 {
             return Ok(Err(DamageKind::TooLong { bytes: len, max: self.bytes_max }));
         }
@@ -145,7 +110,7 @@ impl<R: Read> McapReader<R> {
             // Attachments, indexes, metadata: they may be of any length, and are passed over.
             let skipped = std::io::copy(&mut self.file.by_ref().take(len), &mut std::io::sink())?;
             self.position += skipped;
-            return Ok(if skipped == len { Ok(()) } else { Err(DamageKind::CutOff) });
+            return Ok(if skipped == len { Ok(()) } else { self.cut_off() });
         }
         // What is read grows with what is there, and not by what is claimed.
         let target = if code == CHUNK { &mut self.record } else { &mut self.content };
@@ -167,6 +132,21 @@ impl<R: Read> McapReader<R> {
         })
     }
 
+    /// The file ends too early. Where that is in the summary, all messages are there.
+    fn cut_off(&mut self) -> Result<(), DamageKind> {
+        self.is_over = true;
+        if self.is_in_summary { Ok(()) } else { Err(DamageKind::CutOff) }
+    }
+
+    /// Passes over the footer and what ends a file, to see that nothing follows.
+    fn read_end(&mut self, footer_len: u64) -> Result<Result<(), DamageKind>, LogError> {
+        let end = footer_len.saturating_add(MAGIC.len() as u64);
+        self.position += std::io::copy(&mut self.file.by_ref().take(end), &mut std::io::sink())?;
+        self.record_at = self.position;
+        let more = std::io::copy(&mut self.file.by_ref().take(1), &mut std::io::sink())?;
+        Ok(if more == 0 { Ok(()) } else { Err(DamageKind::Appended) })
+    }
+
     /// True where the file had bytes for all of `buffer`.
     fn fill(&mut self, buffer: &mut [u8]) -> Result<bool, LogError> {
         match self.file.read_exact(buffer) {
@@ -179,8 +159,8 @@ impl<R: Read> McapReader<R> {
         }
     }
 
-    /// The next record of `content`: of a message, its topic, its time, and where its bytes begin and end.
-    fn next_of_content(&mut self) -> Result<Option<(usize, u64, usize, usize)>, DamageKind> {
+    /// The next record of `content`: of a message, its topic and its time.
+    fn next_of_content(&mut self) -> Result<Option<(usize, u64)>, DamageKind> {
         let rest = &self.content[self.next..];
         let head = rest.first_chunk::<RECORD_HEAD>().ok_or(DamageKind::Format("chunk"))?;
         let (code, len) = parse_head(head);
@@ -212,8 +192,8 @@ impl<R: Read> McapReader<R> {
                 let (channel, _, log_time_ns, _) =
                     (fields.u16()?, fields.u32()?, fields.u64()?, fields.u64()?);
                 let (end, len) = (self.next, fields.rest().len());
-                let topic = self.channels.get(&channel);
-                return Ok(topic.map(|&topic| (topic, log_time_ns, end - len, end)));
+                self.message = end - len..end;
+                return Ok(self.channels.get(&channel).map(|&topic| (topic, log_time_ns)));
             }
             _ => {}
         }
@@ -221,9 +201,41 @@ impl<R: Read> McapReader<R> {
     }
 }
 
-/// True of a name that can be told: others, and what they name, are left out.
-fn is_name(name: &str) -> bool {
-    name.len() <= NAME_BYTES_MAX && !name.contains(char::is_control)
+impl<R: Read> Messages for McapReader<R> {
+    fn advance(&mut self) -> Result<Option<(usize, u64)>, LogError> {
+        while !self.is_over {
+            let found = match self.next < self.content.len() {
+                true => self.next_of_content(),
+                false => self.read_record()?.map(|()| None),
+            };
+            match found {
+                Ok(Some(message)) => return Ok(Some(message)),
+                Ok(None) => {}
+                Err(why) => {
+                    self.damage = Some(Damage { file: None, at: Place::Byte(self.record_at), why });
+                    self.is_over = true;
+                }
+            }
+        }
+        self.message = 0..0;
+        Ok(None)
+    }
+
+    fn data(&self) -> &[u8] {
+        &self.content[self.message.clone()]
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn position(&self) -> u64 {
+        self.position
+    }
+
+    fn damages(&self) -> &[Damage] {
+        self.damage.as_slice()
+    }
 }
 
 /// The operation code and the length of a record.
