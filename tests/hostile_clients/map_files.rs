@@ -1,5 +1,7 @@
 //! Small map files that become much when they are restored.
 
+use std::time::Duration;
+
 use crate::siege::{MIB, Siege};
 use crate::support::daemon::client;
 use crate::support::hostile_files::hostile_files;
@@ -8,6 +10,9 @@ use crate::support::hostile_files::hostile_files;
 const HIGH_MIB: usize = 256;
 /// What lies above the mark at most: the file, its body and what was built of it when the mark was met.
 const ABOVE_MIB: usize = 96;
+/// A file that has 75 MB when it is read takes a program that is hardly optimized many seconds on a busy machine.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(120);
+
 /// Puts each file under a name of its own; what was said of it.
 pub(crate) async fn restore_all(
     server: &str,
@@ -17,7 +22,8 @@ pub(crate) async fn restore_all(
     for (i, (what, file)) in files.iter().enumerate() {
         let put = client().put(format!("{server}/v1/maps/hostile-{i}/snapshot"));
         let put = put.header("content-type", "application/octet-stream").body(file.clone());
-        let answer = put.send().await.unwrap_or_else(|error| panic!("{what}: {error}"));
+        let answer =
+            put.timeout(ANSWERED_WITHIN).send().await.unwrap_or_else(|error| panic!("{what}: {error:?}"));
         let status = answer.status();
         said.push((*what, format!("{status} {}", answer.text().await.unwrap())));
     }

@@ -63,8 +63,8 @@ impl Cloud {
     /// What the pixels of a depth image met, row by row; not finite where nothing returned.
     ///
     /// # Errors
-    /// When its pixels are no depths, its size is not that of the camera, its rows do not lie within its data, or it has
-    /// more than [`POINTS_MAX`](super::POINTS_MAX) pixels.
+    /// When its pixels are no depths, its size is not that of the camera, its rows do not lie within its data, or it
+    /// has more than [`POINTS_MAX`](super::POINTS_MAX) pixels.
     pub(super) fn of_depth_image(image: &Image<'_>, camera: &Camera) -> Result<Self, CloudError> {
         let depth = Depth::of_encoding(image.encoding)
             .ok_or_else(|| CloudError::Encoding(excerpt(image.encoding)))?;

@@ -56,8 +56,8 @@ impl Cloud {
     /// The cloud of a message of a kind [that has one](MessageKind::is_cloud).
     ///
     /// # Errors
-    /// When the message is cut off, its fields do not lie within its data, it has more than [`POINTS_MAX`] points, or is
-    /// an image without depths or without a camera.
+    /// When the message is cut off, its fields do not lie within its data, it has more than [`POINTS_MAX`] points, or
+    /// is an image without depths or without a camera.
     pub fn read(kind: MessageKind, message: &[u8], options: CloudOptions<'_>) -> Result<Self, CloudError> {
         match kind {
             MessageKind::PointCloud2 => {

@@ -23,7 +23,8 @@ pub const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".db3.zstd"];
 /// What is added to the name of a file that was compressed.
 const COMPRESSED: &str = ".zstd";
 
-/// The messages of a log: of a file, or of the files of a folder one after another, in the natural order of their names.
+/// The messages of a log: of a file, or of the files of a folder one after another, in the natural order of their
+/// names.
 ///
 /// A recorder that splits its log numbers the files. Of a file that was compressed, and is there as it was before too,
 /// the latter is read. Topics of the same name, type and encoding are one.
