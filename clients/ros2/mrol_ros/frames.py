@@ -219,16 +219,20 @@ def plain_frame(name: str) -> str:
     return name.removeprefix("/")
 
 
+def is_frame_name(name: str) -> bool:
+    """Whether a name is short enough to be kept, and may be shown."""
+    return 0 < len(name.encode(errors="replace")) <= NAME_BYTES_MAX and name.isprintable()
+
+
 def checked_transform(parent: str, child: str, seven: Sequence[float]) -> tuple[float, ...]:
     """The numbers of a transform, with a unit quaternion: programs round them, so any length from 0.5 to 2 is taken.
 
     Raises `BadTransform`.
     """
     for name in (parent, child):
-        if not name or len(name.encode()) > NAME_BYTES_MAX or not name.isprintable():
-            raise BadTransform(
-                f"a frame's name must be 1 to {NAME_BYTES_MAX} printable bytes, got {len(name.encode())}: {name[:40]!r}"
-            )
+        if not is_frame_name(name):
+            got = len(name.encode(errors="replace"))
+            raise BadTransform(f"a frame's name must be 1 to {NAME_BYTES_MAX} printable bytes, got {got}: {name[:40]!r}")
     x, y, z, qx, qy, qz, qw = (float(number) for number in seven)
     length = math.hypot(qx, qy, qz, qw)
     if not (all(map(math.isfinite, (x, y, z))) and 0.5 <= length <= 2.0):

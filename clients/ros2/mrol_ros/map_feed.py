@@ -155,14 +155,16 @@ class MapFeed:
     def read_voxels(self) -> MapVoxels:
         """The voxels as they are now.
 
-        Raises `mrol.MrolError`.
+        Raises `mrol.MrolError`, also before anything is known.
         """
         revision, occupied = self._set.revision, self._set.indices()
+        if revision is None:
+            raise mrol.MrolError("nothing is known of the map yet")
         free_level = self._options.octomap_free_level - self._level
         free = np.zeros((0, 3), np.int32)
         if self._options.octomap_free_level >= 0 and free_level >= 0 and len(occupied):
             free = self._free(occupied, free_level)
-        return MapVoxels(revision or 0, self._resolution_m, occupied, free, max(free_level, 0))
+        return MapVoxels(revision, self._resolution_m, occupied, free, max(free_level, 0))
 
     def _free(self, occupied: NDArray[np.int32], free_level: int) -> NDArray[np.int32]:
         """The free voxels of a coarser level around the occupied ones."""

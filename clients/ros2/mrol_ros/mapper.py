@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .clouds import CloudError, CloudLayout, read_cloud
 from .correction import guess_covariance, moved_covariance
+from .frames import is_frame_name
 from .gravity import GravityWindow
 from .newest import NewestQueue
 from .odometry import Odometry, SensorPlace
@@ -182,6 +183,10 @@ class Mapper:
         counts = self.state.counts
         if self.is_paused:
             counts.paused += 1
+            return
+        if not is_frame_name(cloud.frame):
+            counts.unreadable += 1
+            self._note_once("frame", f"a cloud is left out: its header must name a frame, got {cloud.frame[:40]!r}")
             return
         if not self._is_later(cloud.stamp_ns):
             counts.late += 1

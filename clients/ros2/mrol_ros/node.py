@@ -19,10 +19,11 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Odometry as OdometryMessage
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.executors import MultiThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from sensor_msgs.msg import Imu, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
@@ -113,23 +114,21 @@ class MrolNode(Node):
         self._centers = self.create_publisher(PointCloud2, "octomap_point_cloud_centers", LATCHED)
         self._octomap = None if Octomap is None else self.create_publisher(Octomap, "octomap_binary", LATCHED)
         if self.options.publish_tf:
-            self.create_timer(self.options.transform_period_s, self._keep_tf, MutuallyExclusiveCallbackGroup())
-        self.create_timer(1.0, self._tell, MutuallyExclusiveCallbackGroup())
+            self.create_timer(self.options.transform_period_s, self._keep_tf)
+        self.create_timer(1.0, self._tell)
 
     def _make_subscriptions(self) -> None:
-        self._listen(TFMessage, "/tf", self._on_tf, TF_QOS)
-        self._listen(TFMessage, "/tf_static", self._on_static_tf, TF_STATIC_QOS)
-        self._listen(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, QoSProfile(depth=1))
+        self.create_subscription(TFMessage, "/tf", self._on_tf, TF_QOS)
+        self.create_subscription(TFMessage, "/tf_static", self._on_static_tf, TF_STATIC_QOS)
+        self.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, QoSProfile(depth=1))
         if self.options.odometry_topic:
-            self._listen(OdometryMessage, self.options.odometry_topic, self._on_odometry, _sensor_qos(100, is_reliable=False))
+            self.create_subscription(
+                OdometryMessage, self.options.odometry_topic, self._on_odometry, _sensor_qos(100, is_reliable=False)
+            )
         if self.options.imu_topic:
-            self._listen(Imu, self.options.imu_topic, self._on_imu, _sensor_qos(200, is_reliable=False))
+            self.create_subscription(Imu, self.options.imu_topic, self._on_imu, _sensor_qos(200, is_reliable=False))
         clouds_qos = _sensor_qos(2, is_reliable=self.options.clouds_reliable)
-        self._clouds = self._listen(PointCloud2, "cloud_in", self._on_cloud, clouds_qos)
-
-    def _listen(self, kind: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile) -> Any:
-        # A group of its own: a cloud that is being taken in holds no transform up.
-        return self.create_subscription(kind, topic, callback, qos, callback_group=MutuallyExclusiveCallbackGroup())
+        self._clouds = self.create_subscription(PointCloud2, "cloud_in", self._on_cloud, clouds_qos)
 
     def _make_services(self) -> None:
         offered: list[tuple[Any, str, Callable[[Any, Any], Any]]] = [
@@ -141,7 +140,29 @@ class MrolNode(Node):
         if GetOctomap is not None:
             offered.append((GetOctomap, "octomap_binary", self._get_octomap))
         for kind, name, callback in offered:
-            self.create_service(kind, name, callback, callback_group=MutuallyExclusiveCallbackGroup())
+            # In a group of its own, so that one that takes long holds up itself alone.
+            self.create_service(kind, name, self._beside(callback), callback_group=MutuallyExclusiveCallbackGroup())
+
+    def _beside(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """A callback of a service that runs in a thread of its own: the one of all topics does not wait for the server."""
+
+        async def answered(request: Any, response: Any) -> Any:
+            done: Future[Any] = Future(executor=self.executor)
+
+            def run() -> None:
+                try:
+                    done.set_result(callback(request, response))
+                except Exception as error:
+                    self.get_logger().error(f"a service failed: {error!r}")
+                    done.set_result(response)
+                executor = self.executor
+                if executor is not None:
+                    executor.wake()
+
+            Thread(target=run, daemon=True).start()
+            return await done
+
+        return answered
 
     def close(self) -> None:
         """Ends the threads."""
@@ -314,7 +335,7 @@ def main() -> None:
         node = MrolNode()
     except OptionError as error:
         sys.exit(f"mrol_ros: {error}")
-    executor = MultiThreadedExecutor(num_threads=4)
+    executor = SingleThreadedExecutor()
     executor.add_node(node)
     spinning = Thread(target=executor.spin, daemon=True)
     spinning.start()

@@ -54,6 +54,10 @@ DESCRIPTIONS = {
 """What each parameter means, for `ros2 param describe`."""
 
 
+ROBOT_NAME_MAX = 64
+"""Characters of a robot's name on the server."""
+
+
 class OptionError(ValueError):
     """A parameter that cannot be used."""
 
@@ -165,7 +169,7 @@ class Options:
     def robot_name(self, namespace: str) -> str:
         """The robot's name on the server: what is set, or the namespace, or the host's name."""
         found = self.robot or namespace.strip("/").replace("/", ".") or socket.gethostname()
-        return re.sub(r"[^A-Za-z0-9._-]", "-", found)
+        return re.sub(r"[^A-Za-z0-9._-]", "-", found)[:ROBOT_NAME_MAX]
 
 
 def _check(is_good: bool, name: str, expected: str, value: object) -> None:

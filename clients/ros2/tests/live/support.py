@@ -120,16 +120,20 @@ def room(map_from_sensor, count, rng):
     return map_from_sensor.inverse().apply(points).astype(np.float32)
 
 
-def cloud_message(stamp_ns, frame, points):
-    """A cloud as a lidar's driver writes it, 32 bytes a point."""
-    records = np.zeros(
-        len(points), np.dtype({"names": ["p", "i"], "formats": [("<f4", 3), "<f4"], "offsets": [0, 16], "itemsize": 32})
-    )
+RECORD = {"names": ["p", "i", "t"], "formats": [("<f4", 3), "<f4", "<u4"], "offsets": [0, 16, 20], "itemsize": 32}
+
+
+def cloud_message(stamp_ns, frame, points, *, has_times):
+    """A cloud as a lidar's driver writes it, 32 bytes a point; its times are those of points that were measured nearly at once."""
+    records = np.zeros(len(points), np.dtype(RECORD))
     records["p"] = points
+    records["t"] = np.linspace(0, 2e6, len(points))
     fields = [
         PointField(name=name, offset=at, datatype=7, count=1) for name, at in (("x", 0), ("y", 4), ("z", 8), ("intensity", 16))
     ]
     message = PointCloud2(height=1, width=len(points), fields=fields, point_step=32, row_step=32 * len(points), is_dense=True)
+    if has_times:
+        fields.append(PointField(name="t", offset=20, datatype=6, count=1))
     message.header.frame_id = frame
     message.header.stamp = stamp(stamp_ns)
 
@@ -146,7 +150,9 @@ def stamp(stamp_ns):
 class Robot:
     """A robot that drives in the room: its odometry begins where it stands, and drifts."""
 
-    def __init__(self, *, namespace="", begin=(0.0, 0.0), hz=5.0, points=15_000, own_tf=False, reliable=True, late_s=0.02):
+    def __init__(
+        self, *, namespace="", begin=(0.0, 0.0), hz=5.0, points=15_000, own_tf=False, reliable=True, late_s=0.02, has_times=False
+    ):
         self.namespace = namespace
         self.context = rclpy.Context()
         self.context.init()
@@ -162,7 +168,7 @@ class Robot:
         self.node.create_subscription(TFMessage, tf, self._on_tf, 100)
         self.node.create_subscription(PoseWithCovarianceStamped, "pose", self.poses.append, 100)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
-        self._begin, self._hz, self._points, self._late_s = begin, hz, points, late_s
+        self._begin, self._hz, self._points, self._late_s, self._has_times = begin, hz, points, late_s, has_times
         self._rng = np.random.default_rng(abs(hash(namespace)) % 1000)
         self.sent = 0
         self._stop = Event()
@@ -227,7 +233,7 @@ class Robot:
             stamp_ns = time.time_ns()
             t = self.seconds_of(stamp_ns)
             points = room(self.map_from_base(t) @ BASE_FROM_LIDAR, self._points, self._rng)
-            self._clouds.publish(cloud_message(stamp_ns, "lidar", points))
+            self._clouds.publish(cloud_message(stamp_ns, "lidar", points, has_times=self._has_times))
             self.sent += 1
             self._odom_from_lidar[stamp_ns] = self.odom_from_base(t) @ BASE_FROM_LIDAR
             # Transforms come later than the cloud.

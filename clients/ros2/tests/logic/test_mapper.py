@@ -232,6 +232,9 @@ def test_a_cloud_that_cannot_be_read_stops_nothing():
     assert len(robot.step(bad, 1)) == 1
     assert robot.counts.unreadable == 1
     assert "no field 'x'" in robot.notes[0]
+    assert len(robot.step(cloud(2, frame=""), cloud(3, frame="x" * 65536), cloud(4, frame="a\nb"), 5)) == 2
+    assert robot.counts.unreadable == 4
+    assert max(map(len, robot.notes)) < 300
 
 
 def test_a_place_that_was_found_is_the_next_guess():
