@@ -124,9 +124,13 @@ class Mapper:
         on_mapped: Callable[[MappedCloud], None],
         note: Callable[[str], None],
         *,
+        robot: str = "",
         is_simulated: bool = False,
     ) -> None:
-        """`note` is told what a person should know, each kind of it once; `on_mapped` of each answer."""
+        """`note` is told what a person should know, each kind of it once; `on_mapped` of each answer.
+
+        `robot` is its name on the server.
+        """
         self.queue: NewestQueue[StampedCloud] = NewestQueue()
         self.state = MapperState()
         self.gravity = GravityWindow()
@@ -141,7 +145,9 @@ class Mapper:
         self._session = options.session or (_own_session() if is_simulated else "")
         self._closing = Event()
         self._lock = Lock()
-        self._initial: InitialPose | None = InitialPose(Pose.of(list(options.initial_pose))) if options.initial_pose else None
+        self._robot = robot
+        self._beginning = InitialPose(Pose.of(list(options.initial_pose))) if options.initial_pose else None
+        self._initial: InitialPose | None = self._beginning
         self._initial_tries = 0
         self._last_odom_from_sensor: Pose | None = None
         self._has_accepted = False
@@ -291,7 +297,8 @@ class Mapper:
         with self._lock:
             initial, last, has_accepted = self._initial, self._last_odom_from_sensor, self._has_accepted
         now = place.odom_from_sensor
-        if initial is not None:
+        # A robot that the server knows may have been started again far from where it began.
+        if initial is not None and not (initial is self._beginning and self._robot in m.describe().robots):
             return self._initial_guess(initial, place)
         if last is not None and now is not None:
             return {"motion": last.inverse() @ now}

@@ -76,7 +76,9 @@ class MrolNode(Node):
         is_simulated = bool(self.get_parameter("use_sim_time").value)
         self._link = ServerLink(self.options, self.robot)
         self._odometry = Odometry(self.options)
-        self._mapper = Mapper(self.options, self._link, self._odometry, self._on_mapped, self._warn, is_simulated=is_simulated)
+        self._mapper = Mapper(
+            self.options, self._link, self._odometry, self._on_mapped, self._warn, robot=self.robot, is_simulated=is_simulated
+        )
         self._feed = MapFeed(self.options, self._link, self._on_grid, self._on_voxels, self._wants_voxels)
         self._diagnosis = Diagnosis(self._mapper, self._feed)
         self._correction = Correction(round(self.options.transform_tolerance * 1e9))

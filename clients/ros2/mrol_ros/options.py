@@ -33,7 +33,7 @@ DESCRIPTIONS = {
     "times": "how times of points are read, FIELD:UNIT:FROM; empty: found out",
     "time_offset_s": "is added to a cloud's stamp to have the time of its odometry, s",
     "extrinsics": "where the sensor is on the robot, x y z qx qy qz qw of base_from_sensor; empty: by transforms",
-    "initial_pose": "where the robot begins in the map, x y z qx qy qz qw of map_from_base; empty: not told",
+    "initial_pose": "where a robot that the server does not know begins, x y z qx qy qz qw of map_from_base; empty: not told",
     "range_min_m": "nearer points are skipped; 0: as the server's settings for the robot say",
     "range_max_m": "farther points are skipped; 0: as the server's settings for the robot say",
     "body_m": "points in this box are of the robot itself, x y z x y z in the sensor frame; empty: as the server's settings say",

@@ -18,7 +18,7 @@ from mrol_ros.clouds import read_cloud
 from mrol_ros.messages import cloud_of
 from mrol_ros.octree import OCCUPIED, octree_cells
 
-from .support import BASE_FROM_LIDAR, NodeProcess, Robot, call, running, stamp, take_one, wait_until
+from .support import BASE_FROM_LIDAR, FreezingProxy, NodeProcess, Robot, call, running, stamp, take_one, wait_until
 
 TOLERANCE_NS = 3_000_000_000
 """So long that the answer to each cloud comes in time, however busy the machine is."""
@@ -207,11 +207,37 @@ def test_nothing_is_lost_or_there_twice_when_server_and_node_are_killed(server, 
         again = NodeProcess(tmp_path, server, robot="r1", **CLOUDS)
         with running(again):
             wait_until(lambda: len(robot.poses) >= count + 5, 60, "poses after the node is back")
-        acknowledged = {message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in robot.poses}
-        scans = scans_of(server)
-        ids = [(scan.session, scan.scan_id) for scan in scans]
-        assert len(ids) == len(set(ids))
-        assert {session for session, _ in ids} == {"ros2"}
-        # A robot that stands still is answered, and its scan is not kept: this one drives.
-        assert acknowledged - {scan_id for _, scan_id in ids} == set()
+        check_scans(robot, server)
         assert (again.log.read_text() + node.log.read_text()).count("Traceback") == 0
+
+
+def test_nothing_is_lost_or_there_twice_when_the_network_is_gone(server, tmp_path):
+    robot, proxy = Robot(), FreezingProxy(server)
+    robot.start()
+    node = NodeProcess(tmp_path, proxy, robot="r1", request_timeout_s=1.0, **CLOUDS)
+    with running(proxy, robot, node):
+        wait_until(lambda: len(robot.poses) >= 5, 60, "poses")
+        for _ in range(3):
+            proxy.freeze()
+            began_ns = time.time_ns()
+            time.sleep(3)
+            assert sum(of[0] > began_ns for of in list(robot.corrections)) >= 5
+            assert robot.status("server")[0] == 2
+            proxy.thaw()
+            count = len(robot.poses)
+            wait_until(lambda count=count: len(robot.poses) >= count + 5, 60, "poses after the network is back")
+        assert int(robot.status("clouds")[2]["repeated"]) > 0
+        call(SetBool, "/pause", SetBool.Request(data=True))
+        time.sleep(2)
+        check_scans(robot, server)
+    assert "Traceback" not in node.log.read_text()
+
+
+def check_scans(robot, server):
+    """Whether each scan is in the map once, and all that were acknowledged are."""
+    acknowledged = {message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in list(robot.poses)}
+    ids = [(scan.session, scan.scan_id) for scan in scans_of(server)]
+    assert len(ids) == len(set(ids))
+    assert {session for session, _ in ids} == {"ros2"}
+    # A robot that stands still is answered, and its scan is not kept: this one drives.
+    assert acknowledged - {scan_id for _, scan_id in ids} == set()

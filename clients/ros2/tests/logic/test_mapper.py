@@ -31,12 +31,13 @@ class ScriptedMap:
     """A map that answers as it is told: an exception is raised, None is an acceptance, a text a refusal."""
 
     def __init__(self, *script, scans=1):
+        self.robots = ()
         self.script = list(script)
         self.scans = scans
         self.requests = []
 
     def describe(self):
-        return SimpleNamespace(scans=self.scans)
+        return SimpleNamespace(scans=self.scans, robots=self.robots)
 
     def insert(self, points, **arguments):
         self.requests.append(arguments)
@@ -68,7 +69,9 @@ class Robot:
             for k in range(30):
                 stamp_ns = BEGIN_NS + k * STEP_NS
                 self.odometry.note_transform("odom", "base_link", stamp_ns, pose(0.1 * k).seven(), is_static=False)
-        self.mapper = Mapper(options, self.link, self.odometry, self.mapped.append, self.notes.append, is_simulated=is_simulated)
+        self.mapper = Mapper(
+            options, self.link, self.odometry, self.mapped.append, self.notes.append, robot="r1", is_simulated=is_simulated
+        )
 
     def _forget(self):
         self.forgotten += 1
@@ -183,6 +186,9 @@ def test_an_initial_pose_counts_until_a_cloud_is_accepted_or_many_are_refused():
     robot = Robot("low_overlap", None, None, options=Options(initial_pose=[2.0, 0, 0, 0, 0, 0, 1]))
     requests = robot.step(0, 1, 2)
     assert [("guess" in of) for of in requests] == [True, True, False]
+    known = Robot(options=Options(initial_pose=[2.0, 0, 0, 0, 0, 0, 1]))
+    known.map.robots = ("r1", "r2")
+    assert "guess" not in known.step(0)[0]
     robot = Robot(*["low_overlap"] * (INITIAL_POSE_TRIES + 1))
     covariance = np.diag([0.25, 0.25, 0, 0, 0, 0.07])
     robot.mapper.set_initial_pose(InitialPose(pose(2), covariance))
