@@ -7,6 +7,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 ARGUMENTS = {
     "server": ("localhost:7333", "address of the server's HTTP"),
@@ -29,7 +30,9 @@ def generate_launch_description():
     """The node."""
     given = {name: LaunchConfiguration(name) for name in ARGUMENTS}
     declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()]
-    own = {name: given[name] for name in ("server", "map", "use_sim_time")}
+    # As text, whatever it looks like: a map may be named 7.
+    own = {name: ParameterValue(given[name], value_type=str) for name in ("server", "map")}
+    own["use_sim_time"] = ParameterValue(given["use_sim_time"], value_type=bool)
     node = Node(
         package="mrol_ros",
         executable="node",

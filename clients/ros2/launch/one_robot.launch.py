@@ -4,6 +4,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = {
@@ -20,7 +21,9 @@ def generate_launch_description():
     """The node."""
     given = {name: LaunchConfiguration(name) for name in ARGUMENTS}
     declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()]
-    own = {name: given[name] for name in ("server", "map", "robot", "use_sim_time")}
+    # As text, whatever it looks like: a map may be named 7.
+    own = {name: ParameterValue(given[name], value_type=str) for name in ("server", "map", "robot")}
+    own["use_sim_time"] = ParameterValue(given["use_sim_time"], value_type=bool)
     node = Node(
         package="mrol_ros",
         executable="node",

@@ -9,6 +9,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 BEGINNINGS = {
@@ -31,7 +32,9 @@ def generate_launch_description():
     """A node for each robot."""
     given = {name: LaunchConfiguration(name) for name in ARGUMENTS}
     declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()]
-    own = {name: given[name] for name in ("server", "map", "use_sim_time")}
+    # As text, whatever it looks like: a map may be named 7.
+    own = {name: ParameterValue(given[name], value_type=str) for name in ("server", "map")}
+    own["use_sim_time"] = ParameterValue(given["use_sim_time"], value_type=bool)
     nodes = [
         Node(
             package="mrol_ros",
