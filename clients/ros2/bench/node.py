@@ -32,6 +32,10 @@ print(len(got))
 """
 
 
+SETTLED_S = 5.0
+"""After so long all clouds were taken, and diagnostics say so."""
+
+
 def cpu_s(pid):
     """CPU seconds of a process so far."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
@@ -51,29 +55,35 @@ def main(seconds, points, reliability):
     is_reliable = reliability == "reliable"
     robot = Robot(hz=10.0, points=points, reliable=is_reliable, has_times=True)
     node = NodeProcess(folder, server, robot="r1", clouds_reliable=is_reliable)
-    bare = subprocess.Popen([sys.executable, "-c", BARE, reliability], stdout=subprocess.PIPE, text=True)
     with running(server, node, robot):
         robot.start()
         wait_until(lambda: len(robot.poses) >= 10, 60, "poses")
-        time.sleep(2)
-
-        def counts():
-            values = robot.status("clouds")[2]
-            return {name: int(values[name]) for name in ("received", "dropped", "accepted", "refused", "not_sent", "without_times")}
-
-        begin, sent, begin_s, before = cpu_s(node.pid), robot.sent, time.monotonic(), counts()
-        memory = []
+        robot.is_quiet = True
+        bare = subprocess.Popen([sys.executable, "-c", BARE, reliability], stdout=subprocess.PIPE, text=True)
+        wait_until(lambda: robot.listeners == 2, 30, "a bare subscriber")
+        time.sleep(SETTLED_S)
+        before, sent, used, begin_s, memory = counts(robot), robot.sent, cpu_s(node.pid), time.monotonic(), []
+        robot.is_quiet = False
         while time.monotonic() < begin_s + seconds:
             time.sleep(1)
             memory.append(memory_mib(node.pid))
-        used, took_s, after = cpu_s(node.pid) - begin, time.monotonic() - begin_s, counts()
-        became = {name: after[name] - before[name] for name in after}
-        print(f"{points} points, {reliability}: {robot.sent - sent} clouds in {took_s:.1f} s: {became}")
-        print(f"node: {100 * used / took_s:.1f} % of a core, {memory[0]:.0f} MiB at the begin, {memory[-1]:.0f} MiB at the end")
-        sent, received = robot.sent, robot.status("clouds")[2]["received"]
+        used, took_s = cpu_s(node.pid) - used, time.monotonic() - begin_s
+        robot.is_quiet = True
+        time.sleep(SETTLED_S)
+        after, sent = counts(robot), robot.sent - sent
         bare.terminate()
         of_bare = bare.communicate()[0].strip()
-        print(f"since the start: {sent} sent, {received} received by the node, {of_bare} by a bare subscriber")
+        print(
+            f"{points} points of 32 bytes, {reliability}: {sent} clouds in {took_s:.1f} s, {of_bare} received by a bare subscriber"
+        )
+        print("node:", ", ".join(f"{after[name] - before[name]} {name}" for name in after))
+        print(f"{100 * used / took_s:.1f} % of a core, {memory[0]:.0f} MiB at the begin, {memory[-1]:.0f} MiB at the end")
+
+
+def counts(robot):
+    """What became of the clouds so far, by diagnostics."""
+    values = robot.status("clouds")[2]
+    return {name: int(values[name]) for name in ("received", "dropped", "accepted", "refused", "late", "not_sent", "without_times")}
 
 
 if __name__ == "__main__":

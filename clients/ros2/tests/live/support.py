@@ -216,6 +216,7 @@ class Robot:
         self._begin, self._hz, self._points, self._late_s, self._has_times = begin, hz, points, late_s, has_times
         self._rng = np.random.default_rng(abs(hash(namespace)) % 1000)
         self.sent = 0
+        self.is_quiet = False
         self._stop = Event()
         self._began_ns = time.time_ns()
         self._executor = MultiThreadedExecutor(2, context=self.context)
@@ -275,6 +276,10 @@ class Robot:
     def _drive_clouds(self):
         begin = time.monotonic()
         while not self._stop.is_set():
+            if self.is_quiet:
+                self._stop.wait(0.1)
+                begin = time.monotonic() - self.sent / self._hz
+                continue
             stamp_ns = time.time_ns()
             t = self.seconds_of(stamp_ns)
             points = room(self.map_from_base(t) @ BASE_FROM_LIDAR, self._points, self._rng)
@@ -286,6 +291,11 @@ class Robot:
                 return
             self._send_tf(stamp_ns)
             self._stop.wait(max(0.0, begin + self.sent / self._hz - time.monotonic()))
+
+    @property
+    def listeners(self):
+        """Who subscribes to the clouds."""
+        return self._clouds.get_subscription_count()
 
     def correction_of(self, stamp_ns, tolerance_ns):
         """The map -> odom that was published for the cloud of a stamp."""
