@@ -150,6 +150,7 @@ class Mapper:
         self._initial: InitialPose | None = self._beginning
         self._initial_tries = 0
         self._last_odom_from_sensor: Pose | None = None
+        self._map_from_odom: Pose | None = None
         self._has_accepted = False
         self._last_stamp_ns: int | None = None
         given = options.times_rule
@@ -170,7 +171,8 @@ class Mapper:
     def forget(self) -> None:
         """Begins anew, as in a map that was made anew."""
         with self._lock:
-            self._last_odom_from_sensor, self._has_accepted = None, False
+            self._last_odom_from_sensor = self._map_from_odom = None
+            self._has_accepted = False
 
     def run(self) -> None:
         """Sends clouds until it is closed."""
@@ -229,6 +231,8 @@ class Mapper:
             if answer.accepted:
                 state.counts.accepted += 1
                 self._has_accepted, self._last_odom_from_sensor = True, place.odom_from_sensor
+                if place.odom_from_sensor is not None:
+                    self._map_from_odom = answer.map_from_sensor @ place.odom_from_sensor.inverse()
                 self._initial = None
             else:
                 state.counts.refused += 1
@@ -296,12 +300,16 @@ class Mapper:
         """Where the cloud may have been taken, as arguments of `insert`."""
         with self._lock:
             initial, last, has_accepted = self._initial, self._last_odom_from_sensor, self._has_accepted
+            map_from_odom = self._map_from_odom
         now = place.odom_from_sensor
         # A robot that the server knows may have been started again far from where it began.
         if initial is not None and not (initial is self._beginning and self._robot in m.describe().robots):
             return self._initial_guess(initial, place)
         if last is not None and now is not None:
             return {"motion": last.inverse() @ now}
+        if map_from_odom is not None and now is not None:
+            # The last accepted cloud had no odometry, and one before it had.
+            return {"guess": map_from_odom @ now}
         if has_accepted:
             return {"constant_velocity": True}
         down = self._down(cloud)
@@ -387,7 +395,7 @@ class Mapper:
                 "clock", f"the stamps of clouds went back by {(last_ns - stamp_ns) * 1e-9:.1f} s, as of a clock that was set"
             )
             with self._lock:
-                self._last_odom_from_sensor = None
+                self._last_odom_from_sensor = self._map_from_odom = None
             if not self._options.session and stamp_ns < REAL_CLOCK_NS:
                 self._session = _own_session()
         self._last_stamp_ns = stamp_ns

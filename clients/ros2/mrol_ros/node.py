@@ -97,15 +97,10 @@ class MrolNode(Node):
     def _declared(self) -> Options:
         values: dict[str, Any] = {}
         for of in fields(Options):
-            default = list(of.default) if isinstance(of.default, tuple) else of.default
-            descriptor = ParameterDescriptor(description=DESCRIPTIONS[of.name], read_only=True)
-            if default == []:
-                # An empty list has no type of its own: one of no poses is told by no value.
-                descriptor.dynamic_typing = True
-            value = self.declare_parameter(of.name, None if default == [] else default, descriptor).value
-            if value is None:
-                value = ()
-            values[of.name] = float(value) if isinstance(default, float) else value
+            # Options look at the types: ROS would take no 1 for 1.0, and an empty list has none.
+            descriptor = ParameterDescriptor(description=DESCRIPTIONS[of.name], read_only=True, dynamic_typing=True)
+            default = None if of.default == () else of.default
+            values[of.name] = self.declare_parameter(of.name, default, descriptor).value
         return Options.of(values)
 
     def _make_publishers(self) -> None:
@@ -343,7 +338,9 @@ def main() -> None:
     spinning.start()
     ended.wait()
     executor.shutdown(timeout_sec=CLOSE_MAX_S)
+    spinning.join(CLOSE_MAX_S)
     node.close()
+    node.destroy_node()
     rclpy.shutdown()
 
 

@@ -135,11 +135,11 @@ class Options:
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Options:
-        """The options of parameters by their names.
+        """The options of parameters by their names. Whole numbers are taken for others, and None for an empty list.
 
         Raises `OptionError`.
         """
-        return cls(**{name: tuple(value) if isinstance(getattr(cls, name), tuple) else value for name, value in values.items()})
+        return cls(**{name: _typed(name, value, getattr(cls, name)) for name, value in values.items()})
 
     @property
     def odom(self) -> str:
@@ -170,6 +170,23 @@ class Options:
         """The robot's name on the server: what is set, or the namespace, or the host's name."""
         found = self.robot or namespace.strip("/").replace("/", ".") or socket.gethostname()
         return re.sub(r"[^A-Za-z0-9._-]", "-", found)[:ROBOT_NAME_MAX]
+
+
+def _typed(name: str, value: Any, default: Any) -> Any:
+    """A value in the type of the default."""
+    if isinstance(default, tuple):
+        numbers = () if value is None else tuple(value)
+        _check(all(_is_number(number) for number in numbers), name, "numbers", value)
+        return tuple(float(number) for number in numbers)
+    if isinstance(default, float):
+        _check(_is_number(value), name, "a number", value)
+        return float(value)
+    _check(type(value) is type(default), name, {str: "text", bool: "true or false", int: "a whole number"}[type(default)], value)
+    return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _check(is_good: bool, name: str, expected: str, value: object) -> None:

@@ -211,6 +211,17 @@ def test_without_odometry_it_is_constant_velocity_and_said_once():
     assert "there is no frame 'odom'" in robot.mapper.state.missing
 
 
+def test_the_guess_after_clouds_without_odometry_is_by_the_frame_of_odometry():
+    robot = Robot()
+    requests = robot.step(0, 2, 40, 41)
+    assert "motion" in requests[1]
+    assert requests[2]["constant_velocity"]
+    # Odometry is back, and the map knows where its frame is: the server had the lidar at 7 m, where odometry had it at 1.2 m.
+    robot.odometry.note_transform("odom", "base_link", BEGIN_NS + 42 * STEP_NS, pose(4.2).seven(), is_static=False)
+    guess = robot.step(42)[-1]["guess"]
+    assert guess.translation_m.round(9).tolist() == [11, 0, 0]
+
+
 def test_a_cloud_that_is_not_later_is_left_out_and_a_clock_that_was_set_back_is_told():
     robot = Robot()
     assert len(robot.step(20, 20, 19, 21)) == 2

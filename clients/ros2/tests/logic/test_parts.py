@@ -186,10 +186,21 @@ def test_every_option_is_described_and_what_cannot_be_is_refused():
         ({"initial_pose": [0.0] * 7}, "initial_pose"),
         ({"times": "t:h:stamp"}, "times must be FIELD:UNIT:FROM"),
         ({"range_max_m": math.nan}, "range_max_m must be finite"),
+        ({"range_max_m": "far"}, "range_max_m must be a number, got far"),
+        ({"range_max_m": True}, "range_max_m must be a number, got True"),
+        ({"map": 7}, "map must be text, got 7"),
+        ({"publish_tf": 1}, "publish_tf must be true or false, got 1"),
+        ({"octomap_free_level": 0.5}, "octomap_free_level must be a whole number, got 0.5"),
+        ({"body_m": "abcdef"}, "body_m must be numbers, got abcdef"),
     ]:
         with pytest.raises(OptionError) as error:
             Options.of(values)
         assert words in str(error.value)
+
+
+def test_whole_numbers_are_taken_for_others():
+    options = Options.of({"resolution": 1, "extrinsics": [0, 0, 1, 0, 0, 0, 1], "initial_pose": None})
+    assert (options.resolution, options.extrinsics, options.initial_pose) == (1.0, (0, 0, 1, 0, 0, 0, 1), ())
 
 
 def test_robots_are_named_by_their_namespaces_and_frames_have_prefixes():
