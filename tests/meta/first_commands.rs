@@ -33,7 +33,7 @@ const VENV: &str = "python3 -m venv target/venv && . target/venv/bin/activate";
 /// A page, its first shell command, and how that is run.
 type Row = (&'static str, &'static str, RunBy);
 
-const PAGES: [Row; 21] = [
+const PAGES: [Row; 23] = [
     (".ci/README.md", "", Nothing),
     ("README.md", "cargo run --release -- demo", DEMO),
     ("clients/c/README.md", "cargo build --release -p mrol-c", FirstCommands(LONG)),
@@ -44,6 +44,7 @@ const PAGES: [Row; 21] = [
         FirstCommands(LONG),
     ),
     ("clients/python/README.md", VENV, FirstCommands(GATE)),
+    ("clients/ros2/README.md", "pip install ./clients/python", NotPublished("ros")),
     ("clients/viewer/README.md", "cargo run -- demo", DEMO),
     ("docs/README.md", "", Nothing),
     (
@@ -72,6 +73,7 @@ const PAGES: [Row; 21] = [
     ("docs/guide/python-replica.md", VENV, FirstCommands(LONG)),
     ("docs/guide/python.md", VENV, FirstCommands(GATE)),
     ("docs/guide/robots.md", "mrol maps create hall --resolution 0.1 --levels 5", Documents),
+    ("docs/guide/ros2.md", "pip install ./clients/python", NotPublished("ros")),
     ("docs/guide/upgrades.md", "", Nothing),
     ("docs/guide/viewer.md", "", Nothing),
     (

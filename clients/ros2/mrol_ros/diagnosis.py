@@ -1,0 +1,77 @@
+"""What diagnostics say of the node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from .map_feed import MapFeed
+from .mapper import Mapper
+
+Status = tuple[str, str, str, Mapping[str, object]]
+"""Name, level (ok, warn, error), sentence, values."""
+
+
+class Diagnosis:
+    """Sentences of the node's state; those of clouds count since the last time that they were asked for."""
+
+    def __init__(self, mapper: Mapper, feed: MapFeed) -> None:
+        self._mapper = mapper
+        self._feed = feed
+        self._before = self._numbers()
+
+    def statuses(self, publishers: int) -> list[Status]:
+        """All statuses; `publishers` is how many publish clouds."""
+        return [self._of_clouds(publishers), self._of_server(), self._of_frames(), self._of_map()]
+
+    def _numbers(self) -> dict[str, int]:
+        queue = self._mapper.queue
+        return {"received": queue.received, "dropped": queue.dropped, **asdict(self._mapper.state.counts)}
+
+    def _of_clouds(self, publishers: int) -> Status:
+        numbers, state = self._numbers(), self._mapper.state
+        since = {name: numbers[name] - self._before[name] for name in numbers}
+        self._before = numbers
+        values = {
+            **numbers,
+            "verdict": state.verdict,
+            "reason": state.reason,
+            "times of points": state.times,
+            "publishers": publishers,
+        }
+        if self._mapper.is_paused:
+            level, text = "warn", "paused"
+        elif publishers == 0:
+            level, text = "error", "nobody publishes clouds"
+        elif since["received"] == 0:
+            level = "error"
+            text = "no cloud came: the publisher's QoS may not match (clouds_reliable), or the network drops large ones"
+        elif state.needs_pose:
+            level, text = "error", "the server does not know where the robot is: publish initialpose, or call localize"
+        elif since["refused"] > since["accepted"]:
+            level, text = "warn", f"clouds do not fit: {state.reason}"
+        elif since["unreadable"]:
+            level, text = "error", "clouds cannot be read: the log says why"
+        elif since["dropped"] > since["accepted"]:
+            level, text = "warn", f"{since['dropped']} of {since['received']} clouds were dropped for newer ones"
+        else:
+            level, text = "ok", "clouds are mapped"
+        return "clouds", level, text, values
+
+    def _of_server(self) -> Status:
+        error = self._mapper.state.server_error or self._feed.error
+        if not error and self._feed.revision is None:
+            return "server", "warn", "the server was not reached yet", {}
+        return "server", "error" if error else "ok", error or "the server answers", {}
+
+    def _of_frames(self) -> Status:
+        missing = self._mapper.state.missing
+        if self._mapper.last_cloud is None:
+            missing = "no cloud says yet which frames are needed"
+        return "frames", "warn" if missing else "ok", missing or "odometry is known", {}
+
+    def _of_map(self) -> Status:
+        feed = self._feed
+        values = {"revision": feed.revision, "grid revision": feed.grid_revision, "voxels outside of octrees": feed.outside}
+        text = "the map is followed" if feed.revision is not None else "nothing is known of the map yet"
+        return "map", "ok" if feed.revision is not None and not feed.error else "warn", feed.error or text, values
