@@ -76,6 +76,7 @@ impl Counters {
     }
 
     /// The counters of a word of the plane, to be changed.
+    #[cfg(target_arch = "x86_64")]
     #[inline]
     pub(super) fn of_word_mut(&mut self, word: usize) -> &mut CountersOfWord {
         &mut self.0[word]

@@ -8,5 +8,6 @@ mod rates;
 
 pub use filter::CountingBloomFilter;
 pub use probe::Probe;
+#[cfg(target_arch = "x86_64")]
 pub(crate) use probe::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
 pub use rates::{FilterSettings, FilterSettingsError, HASHES_MAX, expected_rate, ideal_false_positive_rate};

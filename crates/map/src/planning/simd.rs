@@ -1,5 +1,4 @@
 //! The same code, compiled for the widest instructions that the CPU has.
-#![expect(unsafe_code, reason = "instructions that not every machine has")]
 
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::{Avx2, Avx512};
@@ -28,6 +27,7 @@ pub(super) fn run<W: Work>(work: W) -> W::Output {
 }
 
 #[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "instructions that not every machine has")]
 fn run_avx512<W: Work>(_: Avx512, work: W) -> W::Output {
     #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,popcnt")]
     fn with_avx512<W: Work>(work: W) -> W::Output {
@@ -38,6 +38,7 @@ fn run_avx512<W: Work>(_: Avx512, work: W) -> W::Output {
 }
 
 #[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "instructions that not every machine has")]
 fn run_avx2<W: Work>(_: Avx2, work: W) -> W::Output {
     #[target_feature(enable = "avx2,popcnt")]
     fn with_avx2<W: Work>(work: W) -> W::Output {

@@ -1,5 +1,4 @@
 //! Memory asked for before it is needed.
-#![expect(unsafe_code, reason = "a prefetch is an intrinsic")]
 
 /// Starts fetching the line that begins `at`, or lies around it. Any address will do: a prefetch never faults.
 /// Elsewhere than on x86-64 it does nothing.
@@ -7,6 +6,7 @@
 /// Into the second cache, not the first: of the misses of that one some two dozen can be under way (Zen 4), and
 /// whatever is fetched beyond those waits, the look-ups behind it as well (by the filter of a large map, at random, 8.2
 /// ns a point instead of 4.1).
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "a prefetch is an intrinsic"))]
 #[inline(always)]
 pub fn prefetch<T>(at: *const T) {
     #[cfg(target_arch = "x86_64")]

@@ -84,8 +84,14 @@ impl ClusterTable {
 
     /// What the look-up kernels read.
     pub(crate) fn slots(&self) -> Slots<'_> {
-        let Self { tags, keys, clusters, mask_bytes, .. } = self;
-        Slots { tags, keys, clusters, mask_bytes: *mask_bytes }
+        Slots {
+            #[cfg(target_arch = "x86_64")]
+            tags: &self.tags,
+            keys: &self.keys,
+            clusters: &self.clusters,
+            #[cfg(target_arch = "x86_64")]
+            mask_bytes: self.mask_bytes,
+        }
     }
 
     /// The voxels of `block`; none of them when the block is absent.

@@ -17,7 +17,9 @@ mod set;
 mod slots;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
-pub(crate) use cluster::{BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, CacheLine, Cluster};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use cluster::CacheLine;
+pub(crate) use cluster::{BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, Cluster};
 pub use cluster_table::ClusterTable;
 pub(crate) use cluster_update::ClusterUpdate;
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
@@ -27,4 +29,6 @@ pub use moments::{MOMENT_LEVEL, Moments};
 pub use sample::{VolumetricSample, sample_bytes_max, volumetric_sample, volumetric_sample_until};
 pub use set::BLOCKS_PER_STOP_CHECK;
 pub use set::VoxelSet;
-pub(crate) use slots::{BUCKET, Bucket, Slots};
+pub(crate) use slots::Slots;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use slots::{BUCKET, Bucket};

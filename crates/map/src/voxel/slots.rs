@@ -18,16 +18,25 @@ pub(crate) type Tags = u64;
 /// A table's slots as plain slices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slots<'a> {
+    #[cfg(target_arch = "x86_64")]
     pub(crate) tags: &'a [Tags],
     pub(crate) keys: &'a [Bucket],
     pub(crate) clusters: &'a [Cluster],
     /// Bytes of all masks.
+    #[cfg(target_arch = "x86_64")]
     pub(crate) mask_bytes: usize,
 }
 
 impl Slots<'static> {
     /// The slots of a table without a block: there is no cluster where no key is.
-    pub(crate) const NONE: Self = Self { tags: &[0], keys: &[VACANT_BUCKET], clusters: &[], mask_bytes: 0 };
+    pub(crate) const NONE: Self = Self {
+        #[cfg(target_arch = "x86_64")]
+        tags: &[0],
+        keys: &[VACANT_BUCKET],
+        clusters: &[],
+        #[cfg(target_arch = "x86_64")]
+        mask_bytes: 0,
+    };
 }
 
 impl<'a> Slots<'a> {

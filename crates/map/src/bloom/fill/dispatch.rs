@@ -27,6 +27,7 @@ mod tests {
     type Kernel = fn(&mut [u64], &mut Counters, u32, &[u64]);
 
     fn wide_kernels() -> Vec<Kernel> {
+        #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there is no other variant"))]
         let mut kernels: Vec<Kernel> = vec![fill];
         #[cfg(target_arch = "x86_64")]
         if Avx2::detect().is_some() {

@@ -70,6 +70,7 @@ mod tests {
 
     /// The SIMD variants that this machine can run.
     fn variants() -> Vec<(&'static str, FilterContains)> {
+        #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there is no other variant"))]
         let mut variants: Vec<(&'static str, FilterContains)> = vec![("dispatched", filter_contains)];
         #[cfg(target_arch = "x86_64")]
         if Avx2::detect().is_some() {

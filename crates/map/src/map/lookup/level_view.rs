@@ -73,6 +73,7 @@ impl LevelView<'_> {
     }
 
     /// Bytes that look-ups of this kind may read.
+    #[cfg(target_arch = "x86_64")]
     pub(super) fn bytes(&self, lookup: Lookup) -> usize {
         match lookup {
             Lookup::Bloom => self.planes.iter().map(|plane| size_of_val(*plane)).sum(),

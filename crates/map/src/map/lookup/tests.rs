@@ -19,6 +19,7 @@ type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64
 
 /// The SIMD variants that this machine can run.
 fn wide_kernels() -> Vec<(&'static str, Kernel)> {
+    #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there is no other variant"))]
     let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::by_point::occupied)];
     #[cfg(target_arch = "x86_64")]
     if Avx512::detect().is_some() {

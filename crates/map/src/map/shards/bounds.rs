@@ -1,5 +1,4 @@
 //! The box around points, which says what shards they need: a pass over all of them.
-#![expect(unsafe_code, reason = "instructions that not every machine has")]
 
 use crate::geometry::Point;
 #[cfg(target_arch = "x86_64")]
@@ -22,6 +21,7 @@ const LANES: usize = 24;
 
 /// [`bounds`] with registers of twice the size.
 #[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "instructions that not every machine has")]
 fn bounds_avx2(_: Avx2, points: &[Point]) -> Option<Bounds> {
     #[target_feature(enable = "avx2")]
     fn with_avx2(points: &[Point]) -> Option<Bounds> {

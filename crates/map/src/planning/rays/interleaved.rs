@@ -1,5 +1,4 @@
 //! Interleaved rays: while one waits for memory or for a sum, others go on.
-#![expect(unsafe_code, reason = "instructions that not every machine has")]
 
 use super::hits::RayHits;
 use super::rays_in_cells::Request;
@@ -55,6 +54,7 @@ impl<'a> InterleavedRays<'a> {
     /// [`InterleavedRays::some_rounds`] with all axes of a ray in one register. The sums are the same, in the same
     /// order.
     #[cfg(target_arch = "x86_64")]
+    #[expect(unsafe_code, reason = "instructions that not every machine has")]
     fn some_rounds_avx2(
         &mut self,
         _: Avx2,

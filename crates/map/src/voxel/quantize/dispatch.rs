@@ -37,6 +37,7 @@ mod tests {
 
     /// The variants that this machine can run.
     fn variants() -> Vec<(&'static str, Keys)> {
+        #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there is no other variant"))]
         let mut variants: Vec<(&'static str, Keys)> = vec![("dispatched", keys)];
         #[cfg(target_arch = "x86_64")]
         if Avx2::detect().is_some() {

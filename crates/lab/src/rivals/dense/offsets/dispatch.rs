@@ -58,6 +58,7 @@ mod tests {
 
     /// The variants that this machine can run.
     fn variants() -> Vec<(&'static str, Offsets)> {
+        #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there is no other variant"))]
         let mut variants: Vec<(&'static str, Offsets)> = vec![("dispatched", offsets)];
         #[cfg(target_arch = "x86_64")]
         if Avx2::detect().is_some() {
