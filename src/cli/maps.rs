@@ -152,7 +152,14 @@ impl Maps {
             }
             Action::Delete { map, yes } => {
                 let (input, questions) = (io::stdin(), io::stderr());
-                if !yes && input.is_terminal() && questions.is_terminal() {
+                if !yes && input.is_terminal() {
+                    if !questions.is_terminal() {
+                        return Err(CliError::usage(format!(
+                            "map {} is not deleted: its name is asked for on standard error, which is no terminal; --yes \
+                             deletes it without",
+                            map.name
+                        )));
+                    }
                     confirm_deletion(&map.name, input.lock(), questions)?;
                 }
                 map.server.connect().await?.delete_map(&map.name).await?;

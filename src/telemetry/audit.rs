@@ -4,22 +4,15 @@
 //! Lines have the target [`AUDIT`] and lie within the request's span, which says the protocol, the request id, the key
 //! and the peer.
 
-use std::num::NonZeroU32;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
-
+use super::line_limit::LineLimit;
 use super::refused_robots::RefusedRobots;
-use mrol_map::map::MapName;
+use mrol_map::map::{CallerName, MapName};
 use mrol_service::{Change, End, Ended, JudgedScan, MapVersion, Observer, Outcome, Reason};
 
 /// The target of the audit's lines.
 pub const AUDIT: &str = "mrol::audit";
-
-/// Requests of each kind that were refused, failed or left and are written one by one, a second. Anybody may send any
-/// number of them, and must not fill the disk of the log: the others are counted in the next line of their kind.
-const REFUSALS_PER_S_MAX: NonZeroU32 = NonZeroU32::new(10).expect("not zero");
 
 /// Operations whose refusal and failure are lines of their own; those that are done tell by their outcome.
 const CHANGES: [&str; 6] = ["CreateMap", "RenameMap", "DeleteMap", "RestoreMap", "DeleteVoxels", "Undo"];
@@ -39,30 +32,14 @@ pub struct Audit(Arc<Kinds>);
 #[derive(Debug, Default)]
 struct Kinds {
     /// Requests that were not let in, without a key that is known.
-    strangers: Refusals,
+    strangers: LineLimit,
     /// Requests that were not let in, with a key that is known.
-    keys: Refusals,
+    keys: LineLimit,
     /// Changes that failed.
-    failed: Refusals,
+    failed: LineLimit,
     /// Changes whose callers went away.
-    gone: Refusals,
-    /// Robots whose scans began to be refused.
-    scans: Refusals,
+    gone: LineLimit,
     refused_robots: RefusedRobots,
-}
-
-#[derive(Debug)]
-struct Refusals {
-    rate: DefaultDirectRateLimiter,
-    /// Refusals that were not written since the last that was.
-    unwritten: AtomicU64,
-}
-
-impl Default for Refusals {
-    fn default() -> Self {
-        let rate = RateLimiter::direct(Quota::per_second(REFUSALS_PER_S_MAX));
-        Self { rate, unwritten: AtomicU64::new(0) }
-    }
 }
 
 impl Audit {
@@ -72,17 +49,6 @@ impl Audit {
         if let Some(unwritten) = kind.to_write() {
             tracing::info!(target: AUDIT, outcome = "denied", reason, unwritten, "not let in");
         }
-    }
-}
-
-impl Refusals {
-    /// How many refusals were not written since the last that was; none where this one is not written either.
-    fn to_write(&self) -> Option<u64> {
-        if self.rate.check().is_err() {
-            self.unwritten.fetch_add(1, Ordering::Relaxed);
-            return None;
-        }
-        Some(self.unwritten.swap(0, Ordering::Relaxed))
     }
 }
 
@@ -105,30 +71,23 @@ fn write_change(operation: &str, map: Option<&str>, change: &Change, robot: Opti
 
 impl Kinds {
     /// Writes the first of a robot's scans that is refused, and the first that is accepted after it.
-    fn write_scan(&self, map: Option<&MapName>, scan: &JudgedScan) {
-        let Some(map) = map else { return };
+    fn write_scan(&self, caller: Option<&CallerName>, map: &MapName, scan: &JudgedScan) {
         let JudgedScan { robot, session, scan_id, verdict, refusal, overlap, .. } = scan;
         let (operation, verdict) = ("InsertScan", verdict.as_str());
         let (map_name, robot_name, session) = (map.as_str(), robot.as_str(), session.as_str());
-        match refusal {
-            Some(reason) if self.refused_robots.refused(map, robot) => {
-                if let Some(unwritten) = self.scans.to_write() {
-                    tracing::info!(
-                        target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id, verdict,
-                        overlap, reason, outcome = "refused", unwritten, "scan"
-                    );
-                }
+        if let Some(reason) = refusal {
+            if let Some(unwritten) = self.refused_robots.refused(caller, map, robot) {
+                tracing::info!(
+                    target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id, verdict, overlap,
+                    reason, outcome = "refused", unwritten, "scan"
+                );
             }
-            Some(_) => {}
-            None => {
-                if let Some(row) = self.refused_robots.accepted(map, robot) {
-                    tracing::info!(
-                        target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id,
-                        scans_refused = row.scans, seconds = row.since.elapsed().as_secs_f64(),
-                        outcome = "accepted_again", "scan"
-                    );
-                }
-            }
+        } else if let Some(row) = self.refused_robots.accepted(caller, map, robot) {
+            tracing::info!(
+                target: AUDIT, operation, map = map_name, robot = robot_name, session, scan_id,
+                scans_refused = row.scans, seconds = row.since.elapsed().as_secs_f64(),
+                outcome = "accepted_again", "scan"
+            );
         }
     }
 }
@@ -141,12 +100,14 @@ impl Observer for Audit {
         match end {
             End::Done(Outcome::Changed(change)) | End::DoneUnheard(change) => {
                 if let (Some(map), true) = (ended.map, ANOTHER_MAP.contains(operation)) {
-                    self.0.refused_robots.forget(map);
+                    self.0.refused_robots.forget(map, change.renamed_to.as_ref());
                 }
                 write_change(operation, map, change, None);
             }
             End::Done(Outcome::Scan(scan)) if !scan.replayed => {
-                self.0.write_scan(ended.map, scan);
+                if let Some(map) = ended.map {
+                    self.0.write_scan(ended.caller, map, scan);
+                }
                 if let JudgedScan { robot, carved: Some(change), .. } = scan {
                     write_change(operation, map, change, Some(robot.as_str()));
                 }

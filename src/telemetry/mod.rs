@@ -3,6 +3,7 @@
 mod audit;
 mod exposition;
 mod families;
+mod line_limit;
 mod log;
 mod map_counters;
 mod metrics;

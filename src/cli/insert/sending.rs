@@ -141,6 +141,10 @@ impl Sending<'_> {
         if is_passing(&error) {
             return Stopped::ForNow(error);
         }
+        // The map was there, and its settings fit.
+        if self.counted.answered > 0 {
+            return Stopped::ForGood(self.not_answered(&error));
+        }
         let advice = advice(&error);
         Stopped::ForGood(CliError::failed(format!("{}: {error}{advice}", self.name())))
     }

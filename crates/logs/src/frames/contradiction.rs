@@ -9,7 +9,7 @@ pub(super) const SAME_M: f64 = 1e-3;
 /// Two poses of a frame whose directions are as close as this are told as the same, degrees.
 pub(super) const SAME_DEG: f64 = 0.1;
 
-/// What a transform says against what was told before; what is told last counts.
+/// What a transform says against what was told before.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contradiction {
     /// A frame hangs on another parent than before.
@@ -44,15 +44,15 @@ impl Display for Contradiction {
         match self {
             Self::OtherParent { child, parents: [one, other] } => write!(
                 f,
-                "frame {:?} hangs on {:?} and on {:?}: two publishers tell of it, and the last one counts",
+                "frame {:?} hangs on {:?} and on {:?}: two publishers tell of it, and each scan is put by what was told last",
                 excerpt(child),
                 excerpt(one),
                 excerpt(other),
             ),
             Self::Elsewhere { parent, child, off_m, off_deg } => write!(
                 f,
-                "frame {:?} is fixed in {:?} at two poses, {off_m:.3} m and {off_deg:.1} degrees apart: the one told \
-                 last counts; is one of two publishers wrong?",
+                "frame {:?} is fixed in {:?} at two poses, {off_m:.3} m and {off_deg:.1} degrees apart: each \
+                 scan is put by what was told last before it; is one of two publishers wrong?",
                 excerpt(child),
                 excerpt(parent),
             ),

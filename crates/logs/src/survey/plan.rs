@@ -94,7 +94,14 @@ impl Plan {
                 Some(gravity)
             }
             Err(why) => {
-                missing.push(format!("no gravity: {why}. The first scan is taken to be level"));
+                let taken = match camera {
+                    None => "The first scan is taken to be level",
+                    Some(_) => {
+                        "The first image is taken as if it was of a level sensor whose z points up: give --axes optical for a \
+                         level camera that looks ahead"
+                    }
+                };
+                missing.push(format!("no gravity: {why}. {taken}"));
                 None
             }
         };

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::precedence::Precedence;
 
@@ -20,9 +20,16 @@ pub(super) struct Background {
     running: Arc<AtomicUsize>,
 }
 
+/// How long a job pauses in all, at most: its caller waits for an answer, for half a minute as clients are set.
+const PAUSED_MAX: Duration = Duration::from_secs(5);
+
 /// A job in hand, until this is dropped.
 #[derive(Debug)]
-pub(super) struct InBackground(Background);
+pub(super) struct InBackground {
+    background: Background,
+    /// How long it may still pause.
+    left: Duration,
+}
 
 impl Background {
     /// Work on what the jobs of `robots` leave of so many cores.
@@ -32,41 +39,43 @@ impl Background {
 
     pub(super) fn begin(&self) -> InBackground {
         self.running.fetch_add(1, Ordering::Relaxed);
-        InBackground(self.clone())
+        InBackground { background: self.clone(), left: PAUSED_MAX }
     }
 }
 
 impl InBackground {
     /// True while robots are at work, and they and this work together take all cores: one is left for what else the
-    /// server does.
+    /// server does. Never of a job that paused for as long as it may.
     pub(super) fn is_due(&self) -> bool {
-        let Background { robots, cores, running } = &self.0;
+        let Background { robots, cores, running } = &self.background;
         let at_work = robots.at_work();
-        at_work > 0 && at_work + running.load(Ordering::Relaxed) >= *cores
+        !self.left.is_zero() && at_work > 0 && at_work + running.load(Ordering::Relaxed) >= *cores
     }
 
-    /// Returns when robots are no longer at work, or soon, after so much work.
-    pub(super) fn pause_after(&self, worked: Duration) {
-        self.0.robots.wait_while_at_work(worked * PAUSE_MAX);
+    /// Returns when robots are no longer at work, or soon, after so much work; a job pauses for no longer than
+    /// [`PAUSED_MAX`] in all.
+    pub(super) fn pause_after(&mut self, worked: Duration) {
+        let begin = Instant::now();
+        self.background.robots.wait_while_at_work((worked * PAUSE_MAX).min(self.left));
+        self.left = self.left.saturating_sub(begin.elapsed());
     }
 }
 
 impl Drop for InBackground {
     fn drop(&mut self) {
-        self.0.running.fetch_sub(1, Ordering::Relaxed);
+        self.background.running.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Instant;
 
     #[test]
     fn work_pauses_while_robots_want_its_core_and_no_longer_than_may() {
         let robots = Precedence::default();
         let two_cores = Background::behind(&robots, 2);
-        let job = two_cores.begin();
+        let mut job = two_cores.begin();
         assert!(!job.is_due());
         let at_work = robots.begin();
         assert!(job.is_due());
@@ -79,6 +88,21 @@ mod tests {
             drop(at_work);
         });
         assert!(!job.is_due());
+    }
+
+    #[test]
+    fn work_that_paused_for_as_long_as_it_may_goes_on_beside_robots() {
+        let robots = Precedence::default();
+        let one_core = Background::behind(&robots, 1);
+        let mut job = one_core.begin();
+        let _at_work = robots.begin();
+        job.left = Duration::from_millis(30);
+        let begin = Instant::now();
+        for _ in 0..100 {
+            job.pause_after(Duration::from_millis(5));
+        }
+        assert!(begin.elapsed() < Duration::from_millis(5) * PAUSE_MAX * 100);
+        assert!(!job.is_due() && one_core.begin().is_due());
     }
 
     #[test]

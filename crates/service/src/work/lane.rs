@@ -200,7 +200,7 @@ impl Lane {
                 threads: &threads,
                 part,
                 held: RefCell::new(thread),
-                in_background,
+                in_background: RefCell::new(in_background),
                 part_begun: Cell::new(Instant::now()),
                 paused_for: Cell::default(),
             };

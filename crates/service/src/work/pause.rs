@@ -20,7 +20,7 @@ pub(super) struct Pauses<'a> {
     pub(super) part: Duration,
     pub(super) held: RefCell<HeldThread>,
     /// Of a job that others are not to wait for.
-    pub(super) in_background: Option<InBackground>,
+    pub(super) in_background: RefCell<Option<InBackground>>,
     /// When the part in hand was begun.
     pub(super) part_begun: Cell<Instant>,
     pub(super) paused_for: Cell<Duration>,
@@ -28,12 +28,12 @@ pub(super) struct Pauses<'a> {
 
 impl Pauses<'_> {
     fn is_way_of_robots_due(&self) -> bool {
-        self.in_background.as_ref().is_some_and(InBackground::is_due)
+        self.in_background.borrow().as_ref().is_some_and(InBackground::is_due)
     }
 
     /// Leaves the core to robots whose scans fit, where they want it.
     fn give_way_to_robots(&self) {
-        if let Some(in_background) = self.in_background.as_ref().filter(|job| job.is_due()) {
+        if let Some(in_background) = self.in_background.borrow_mut().as_mut().filter(|job| job.is_due()) {
             in_background.pause_after(self.part_begun.get().elapsed());
         }
     }
