@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn a_printed_file_has_every_setting_and_is_read_as_what_it_was() {
         let robot = RobotConfig { range_max_m: Some(30.0), ..RobotConfig::default() };
-        let robots = [EVERY_ROBOT, "del\u{7f}", "a.b \"c\"\n'"].map(|name| (name.to_owned(), robot.clone()));
+        let robots = [EVERY_ROBOT, "a.b", "A_1-2"].map(|name| (name.to_owned(), robot.clone()));
         let mut config = Config { robots: robots.into(), ..Config::default() };
         config.access.hosts = vec!["mrol".into()];
         let printed = config.to_toml();

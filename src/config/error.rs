@@ -1,5 +1,6 @@
 //! Errors of the settings.
 
+use mrol_map::map::NameError;
 use mrol_map::mapping::{CarvingSettingsError, OdometrySettingsError};
 use mrol_map::scan::PointFilterError;
 use std::path::PathBuf;
@@ -61,6 +62,16 @@ pub enum ConfigError {
         name: String,
         /// The variable with the right spelling.
         meant: String,
+    },
+    /// A table of a robot that no robot can have.
+    #[error(
+        "robots.{name:?}: {error}; `[robots.\"*\"]` is for all robots that have no table, and no other pattern counts"
+    )]
+    RobotName {
+        /// The name of the table.
+        name: String,
+        /// What is wrong with it.
+        error: NameError,
     },
     /// The point filter of a robot is not valid.
     #[error("robots.{name}: {error}")]

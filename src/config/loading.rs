@@ -188,6 +188,12 @@ mod tests {
         assert!(error("[tls]\nkey = \"a\"").contains("tls.certificate is missing"));
         assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
         assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
+        for (name, table) in
+            [("r*", "[robots.\"r*\"]\nrecover = true"), ("a b", "[robots.\"a b\"]\nrecover = true")]
+        {
+            let named = error(table);
+            assert!(named.contains(&format!("robots.{name:?}: robot must be 1 to 64 of")), "{named}");
+        }
         let margin = error("[robots.r]\ncarve = true\ncarve_margin_voxels = 9");
         assert!(margin.contains("robots.r: carve_margin_voxels must be 1 to 8, got 9"), "{margin}");
         let sensor = error("[robots.r]\nsensor = \"spinning 0 1800 -24.9 2\"");

@@ -22,8 +22,11 @@ use serde::{Deserialize, Serialize};
 
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
+use mrol_map::map::RobotName;
 use mrol_map::mapping::StationarySettings;
-use mrol_service::{Limits, OutOfRange, ServiceSettings, Setting, SettingKind, SettingValue, Unit};
+use mrol_service::{
+    EVERY_ROBOT, Limits, OutOfRange, ServiceSettings, Setting, SettingKind, SettingValue, Unit,
+};
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: f64 = 3600.0;
@@ -107,6 +110,9 @@ impl Config {
             return Err(ConfigError::Missing { needed, by });
         }
         for (name, robot) in &self.robots {
+            if let (true, Err(error)) = (name != EVERY_ROBOT, RobotName::new(name)) {
+                return Err(ConfigError::RobotName { name: name.clone(), error });
+            }
             if let Err(error) = robot.filter().checked() {
                 return Err(ConfigError::Robot { name: name.clone(), error });
             }

@@ -1,7 +1,9 @@
 //! `mrol insert` over connections that break.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -86,4 +88,51 @@ fn who_gives_up_is_told_how_to_go_on_and_going_on_adds_no_scan_twice() {
     assert_eq!(again.len(), SCANS);
     assert!(again.iter().all(|line| line["accepted"] == true), "{again:?}");
     assert_eq!(scans_in_map(&server), SCANS);
+}
+
+/// Forwards connections to a server, and what a client sends a little at a time; its address.
+fn slow_proxy(server: &str) -> String {
+    let (listener, server) = (TcpListener::bind("127.0.0.1:0").unwrap(), server.replace("http://", ""));
+    let address = format!("http://{}", listener.local_addr().unwrap());
+    std::thread::spawn(move || {
+        for mut client in listener.incoming().flatten() {
+            let Ok(mut upstream) = TcpStream::connect(&server) else { return };
+            let (from, to) = (upstream.try_clone().unwrap(), client.try_clone().unwrap());
+            std::thread::spawn(move || forward(from, to, usize::MAX));
+            std::thread::spawn(move || {
+                let mut buffer = [0; 4096];
+                while let Ok(read @ 1..) = client.read(&mut buffer) {
+                    std::thread::sleep(Duration::from_millis(50));
+                    if upstream.write_all(&buffer[..read]).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+    });
+    address
+}
+
+#[test]
+fn who_stops_since_the_map_was_renamed_is_told_how_to_go_on_and_going_on_adds_no_scan_twice() {
+    let (sequence, _, server) = sequence_and_server();
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let through = slow_proxy(&server.grpc);
+    let mut insert = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    insert.args(["insert", &scans, "--map", "a", "--poses", &truth, "--json", "--server", &through]);
+    let mut insert = insert.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut first = String::new();
+    BufReader::new(insert.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.contains("0000.ply"), "{first}");
+    objects(&["maps", "rename", "a", "b", "--server", &server.grpc]);
+    let output = insert.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("map_not_found") && !said.contains("--create"), "{said}");
+    let (_, options) = said.split_once("The same command with ").expect(&said);
+    let (options, _) = options.split_once(" goes on").expect(&said);
+    let options: Vec<&str> = options.split(' ').collect();
+    let again = ["insert", &scans, "--map", "b", "--poses", &truth, "--server", &server.grpc];
+    assert_eq!(objects(&[&again[..], &options].concat()).len(), SCANS);
+    assert_eq!(objects(&["maps", "show", "b", "--server", &server.grpc])[0]["scans"], SCANS);
 }

@@ -12,7 +12,7 @@ use mrol_logs::sequence::{LoggedScan, Odometer};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::geometry::Pose;
 use mrol_map::mapping::Guess;
-use mrol_map::scan::PointFilter;
+use mrol_map::scan::{PointFilter, UnitDoubt};
 
 /// Characters of a scan's name: a stamp of this century, in milliseconds.
 const NAME_WIDTH: usize = 14;
@@ -44,6 +44,10 @@ impl Map {
         while let Some((mut scan, position)) = scans.next(&output)? {
             let name = name_of_stamp(scan.stamp_ns);
             let points = std::mem::take(&mut scan.points);
+            if k == 0 {
+                let doubt = UnitDoubt::of(points.iter().map(|point| point.to_f64()));
+                doubt.into_iter().for_each(|doubt| output.note(format!("{}: {doubt}", path.display())));
+            }
             match Usable::of(points, scan.times_s.take(), &filter) {
                 Usable::Points { points, times_s, skipped } => {
                     let is_first = run.trajectory.is_empty();

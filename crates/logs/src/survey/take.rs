@@ -89,9 +89,8 @@ impl LogSurvey {
                 Imu::read(message.data)?;
             }
             MessageKind::Image => {
-                if summary.encoding.is_none() {
-                    summary.encoding = Some(excerpt(Image::read(message.data)?.encoding));
-                }
+                let Image { encoding, .. } = Image::read(message.data)?;
+                summary.encoding.get_or_insert_with(|| excerpt(encoding));
             }
             MessageKind::CameraInfo => note_camera(summary, message.data, &mut self.contradictions)?,
             kind if kind.is_cloud()
