@@ -186,3 +186,19 @@ fn what_makes_no_sense_of_a_log_is_refused() {
     let empty = Log::of(McapWriter::default().finish());
     assert!(complaint(&["log", &empty.path], 1).contains("no topic with clouds"));
 }
+
+#[test]
+fn a_folder_of_ros_2_is_a_log_and_one_with_scan_files_beside_it_is_refused() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/logs/tests/fixtures");
+    let of = |name: &str| objects(&["log", fixtures.join(name).to_str().unwrap()]);
+    assert_eq!(of("bag_plain"), of("zstd.mcap"), "the same topics, uses and what is missing");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().to_str().unwrap();
+    for name in ["run_0.mcap", "run_1.mcap"] {
+        std::fs::copy(fixtures.join("zstd.mcap"), folder.path().join(name)).unwrap();
+    }
+    assert_eq!(objects(&["log", path])[0]["messages"], 2 * of("zstd.mcap")[0]["messages"].as_u64().unwrap());
+    std::fs::write(folder.path().join("0000.ply"), "").unwrap();
+    let said = complaint(&["map", path, SETTINGS[0], SETTINGS[1]], 2);
+    assert!(said.contains("the folder has a log, and 1 scan files such as"), "{said}");
+}

@@ -8,6 +8,7 @@ use mrol_logs::point_times::TimesOption;
 use mrol_logs::sequence::SequenceOptions;
 use mrol_logs::survey::Choice;
 use mrol_map::geometry::Pose;
+use mrol_map::scan::scan_files;
 
 /// What of a log is used, and how.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -56,7 +57,7 @@ impl LogOptions {
     /// The log among what a command is given; none where that is scan files.
     ///
     /// # Errors
-    /// When there is a log and something else, or an option of logs and no log.
+    /// When there is a log and something else beside it, or an option of logs and no log.
     pub(crate) fn path_among<'a>(&self, paths: &'a [PathBuf]) -> Result<Option<&'a Path>, CliError> {
         match (paths.iter().find(|path| Bag::is_log(path)), self.first_given()) {
             (Some(path), _) if paths.len() > 1 => Err(CliError::usage(format!(
@@ -64,7 +65,15 @@ impl LogOptions {
                 path.display(),
                 paths.len()
             ))),
-            (Some(path), _) => Ok(Some(path)),
+            (Some(path), _) => match scan_files(std::slice::from_ref(path)) {
+                Ok(scans) if path.is_dir() => Err(CliError::usage(format!(
+                    "{}: the folder has a log, and {} scan files such as {}: name the files of one of them",
+                    path.display(),
+                    scans.len(),
+                    scans[0].display()
+                ))),
+                _ => Ok(Some(path)),
+            },
             (None, Some(option)) => Err(CliError::usage(format!("{option} is for a log, such as run.mcap"))),
             (None, None) => Ok(None),
         }
