@@ -51,6 +51,12 @@ impl Audited {
         request.send().await.unwrap()
     }
 
+    async fn make_map_a(&self) {
+        let settings = json!({"resolution_m": 0.1, "levels": 3});
+        let made = self.http(Method::PUT, "/v1/maps/a", "made", Some(&self.operator), settings).await;
+        assert_eq!(made.status(), StatusCode::CREATED);
+    }
+
     /// Ends the server; the lines of its audit.
     fn ended(self) -> Vec<Value> {
         assert_eq!(self.server.stop(), Some(0));
@@ -137,11 +143,7 @@ fn wall(x: f32) -> Vec<[f32; 3]> {
 async fn a_scan_that_carves_is_written_with_how_much_it_took_out() {
     let audited = Audited::start(&[]);
     let key = Some(&audited.operator);
-    let made = json!({"resolution_m": 0.1, "levels": 3});
-    assert_eq!(
-        audited.http(Method::PUT, "/v1/maps/a", "made", key, made).await.status(),
-        StatusCode::CREATED
-    );
+    audited.make_map_a().await;
     let scan = |robot: &str, wall_m: f32| {
         let guess = json!({"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]});
         json!({"robot": robot, "points": wall(wall_m), "align": false, "carve": true, "guess": guess})
@@ -166,11 +168,7 @@ async fn a_scan_that_carves_is_written_with_how_much_it_took_out() {
 async fn refusals_of_a_robot_are_written_when_they_begin_and_when_they_end() {
     let audited = Audited::start(&[]);
     let key = Some(&audited.operator);
-    let made = json!({"resolution_m": 0.1, "levels": 3});
-    assert_eq!(
-        audited.http(Method::PUT, "/v1/maps/a", "made", key, made).await.status(),
-        StatusCode::CREATED
-    );
+    audited.make_map_a().await;
     let guess = json!({"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]});
     let mut refused = Vec::new();
     // The first makes the map; one wall leaves two directions open.

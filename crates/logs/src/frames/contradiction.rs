@@ -58,7 +58,7 @@ impl Display for Contradiction {
             ),
             Self::FixedAndMoving { parent, child } => write!(
                 f,
-                "frame {:?} is told by /tf and by /tf_static in {:?}: it counts as fixed, from when that was told on",
+                "frame {:?} is told by /tf and by /tf_static in {:?}: it counts as fixed",
                 excerpt(child),
                 excerpt(parent),
             ),
