@@ -1,6 +1,7 @@
 //! Logs of robots: `mrol log`, and `mrol map` and `mrol insert` of one.
 
 use std::path::Path;
+use std::time::Instant;
 
 use mrol::geometry::{Point, Pose, Twist};
 use mrol::scan::read_trajectory;
@@ -132,6 +133,16 @@ fn a_log_becomes_a_map_and_the_same_one_on_a_server() {
     let rest = objects(&part);
     assert_eq!((first.len(), rest.len()), (3, 2));
     assert_eq!(rest[1]["map_from_sensor"], there[4]["map_from_sensor"]);
+    // As fast as it was recorded: never faster, and the same map.
+    let played = [&insert[..3], &["c"], &insert[4..], &["--create", "--real-time"], &SETTINGS].concat();
+    let begin = Instant::now();
+    let played = mrol(&[&played[..], &["--json"]].concat()).assert().success();
+    assert!(begin.elapsed().as_secs_f64() >= TURN_S * (SCANS - 1) as f64, "{:?}", begin.elapsed());
+    let (said, noted) = (&played.get_output().stdout, &played.get_output().stderr);
+    assert!(String::from_utf8_lossy(noted).contains("the last scan was sent "));
+    let lines: Vec<Value> =
+        serde_json::Deserializer::from_slice(said).into_iter().map(Result::unwrap).collect();
+    assert_eq!((lines.len(), &lines[4]["map_from_sensor"]), (SCANS, &there[4]["map_from_sensor"]));
     assert_eq!(server.stop(), Some(0));
 }
 
@@ -180,6 +191,8 @@ fn what_makes_no_sense_of_a_log_is_refused() {
     assert!(map(&["other.ply"], 2).contains("a log is taken alone"));
     let scans = complaint(&["map", "scans", "--resolution", "0.1", "--every", "2"], 2);
     assert!(scans.contains("--every is for a log"), "{scans}");
+    let scans = complaint(&["insert", "scans", "--map", "a", "--real-time"], 2);
+    assert!(scans.contains("--real-time is for a log"), "{scans}");
     let nothing = Log::of(b"#ROSBAG V2.0\n".to_vec());
     assert!(complaint(&["log", &nothing.path], 1).contains("no MCAP file"));
     assert!(complaint(&["log", "there-is-none.mcap"], 1).contains("there-is-none.mcap"));

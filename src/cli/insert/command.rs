@@ -104,6 +104,10 @@ pub(crate) struct Insert {
     #[cfg(feature = "logs")]
     #[command(flatten)]
     pub(super) log: LogOptions,
+    /// Send the clouds of a log when their stamps say, as a robot does [default: as fast as they are answered]
+    #[cfg(feature = "logs")]
+    #[arg(long, help_heading = "Options of logs")]
+    pub(super) real_time: bool,
 }
 
 impl Insert {
@@ -114,6 +118,10 @@ impl Insert {
         #[cfg(feature = "logs")]
         if let Some(path) = self.log.path_among(&self.scans)? {
             return self.run_log(path, output).await;
+        }
+        #[cfg(feature = "logs")]
+        if self.real_time {
+            return Err(CliError::usage("--real-time is for a log, such as run.mcap"));
         }
         if self.session.is_some() && self.first_scan_id.is_none() {
             return Err(CliError::usage("--session of scan files needs --first-scan-id"));

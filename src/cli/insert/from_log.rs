@@ -7,6 +7,7 @@ use tokio::sync::mpsc;
 
 use super::attempts::{Attempts, is_passing};
 use super::command::Insert;
+use super::pace::Pace;
 use super::report::{FailedLine, ScanLine};
 use super::sending::{Answers, SCANS_AHEAD, advice, concerns_all};
 use crate::cli::alignment_options::GuessName;
@@ -40,6 +41,7 @@ impl Insert {
             session,
             odometer: Odometer::default(),
             counted: Answers::default(),
+            pace: self.real_time.then(Pace::default),
             output: output.with_bar_of_bytes(log.bytes),
         };
         if let Some(done_ns) = sending.done_ns {
@@ -105,6 +107,8 @@ struct LogSending<'a> {
     done_ns: Option<i64>,
     odometer: Odometer,
     counted: Answers,
+    /// Where the log is played as fast as it was recorded.
+    pace: Option<Pace>,
     output: Output,
 }
 
@@ -126,6 +130,9 @@ impl LogSending<'_> {
                 continue;
             }
             let request = self.request(&mut scan, is_first)?;
+            if let Some(pace) = &mut self.pace {
+                pace.wait(scan.stamp_ns).await;
+            }
             is_first = !self.send(&scan, request).await? && is_first;
         }
         if let Some(done_ns) = self.done_ns.filter(|_| taken > 0) {
@@ -136,6 +143,9 @@ impl LogSending<'_> {
                 name_of_stamp(done_ns),
                 self.session
             )));
+        }
+        if let Some(pace) = self.pace.as_ref().filter(|_| self.counted.answered > 0) {
+            self.output.note(pace.lateness().to_string());
         }
         match taken {
             0 => Err(CliError::failed(format!(

@@ -4,6 +4,8 @@ mod attempts;
 mod command;
 #[cfg(feature = "logs")]
 mod from_log;
+#[cfg(feature = "logs")]
+mod pace;
 mod plan;
 mod report;
 mod sending;

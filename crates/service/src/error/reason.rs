@@ -193,7 +193,7 @@ reasons! {
         ProbeLate "probe_late" Both: "a health check did not come within `probe_time_max_s`", "send it faster";
         RevisionNotReached "revision_not_reached" Both: "`min_revision` did not come in time", "wait longer";
         WatchStalled "watch_stalled" Both: "a watch's client took no message for `watch_unread_max_s`", "read on, or watch again from the last revision";
-        TimeLimit "time_limit" Both: "the scan or undo took longer than `alignment_time_max_s`, `insertion_time_max_s` or `undo_time_max_s`", "send a smaller scan, or raise the limit";
+        TimeLimit "time_limit" Both: "the scan or undo took longer than `alignment_time_max_s`, `insertion_time_max_s` or `undo_time_max_s`", "send a smaller scan, or raise the limit; where it waited for others, which the message says, send it again later";
     }
     Unavailable {
         CatalogBusy "catalog_busy" Both: "a map has been made, replaced, renamed, deleted or opened for long: it is large, or its disk slow", "retry as told";

@@ -1,5 +1,6 @@
 //! How long one request may take of the threads for work that uses the CPU.
 
+use std::fmt::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -8,20 +9,24 @@ use parking_lot::Mutex;
 use crate::error::{Reason, ServiceError};
 use mrol_map::util::StopSignal;
 
+/// Shorter waiting is not worth a word.
+const WAITED_MIN: Duration = Duration::from_millis(100);
+
 /// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
-/// deadline bounds. The time while it gives way to others does not count. A clone is the same limit of the same
-/// request.
+/// deadline bounds. The time while it gives way to others does not count; that for which it waits for another thread
+/// does, and an error tells it. A clone is the same limit of the same request.
 #[derive(Debug, Clone)]
 pub(crate) struct TimeLimit {
     name: &'static str,
     most: Duration,
     ends: Arc<Mutex<Option<Instant>>>,
+    waited: Arc<Mutex<Duration>>,
 }
 
 impl TimeLimit {
     /// The limit `limits.NAME_s` of the settings, which is so many seconds.
     pub(crate) fn new(name: &'static str, most_s: f64) -> Self {
-        Self { name, most: Duration::from_secs_f64(most_s), ends: Arc::default() }
+        Self { name, most: Duration::from_secs_f64(most_s), ends: Arc::default(), waited: Arc::default() }
     }
 
     /// Runs `job` under `stop` and this limit. An error of a job that was stopped in time names the limit.
@@ -48,9 +53,10 @@ impl TimeLimit {
     /// # Errors
     /// The limit, once it is over.
     pub(crate) async fn wait<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
-        let ends = self.ends();
-        let waited = tokio::time::timeout_at(ends.into(), turn).await;
-        waited.map_err(|_| self.named(ServiceError::new(Reason::TimeLimit, "")))
+        let (begin, ends) = (Instant::now(), self.ends());
+        let turn = tokio::time::timeout_at(ends.into(), turn).await;
+        *self.waited.lock() += begin.elapsed();
+        turn.map_err(|_| self.named(ServiceError::new(Reason::TimeLimit, "")))
     }
 
     /// The error, and where it says that the time is up, which time.
@@ -58,8 +64,16 @@ impl TimeLimit {
         if error.reason != Reason::TimeLimit {
             return error;
         }
-        let message =
+        let mut message =
             format!("the request took longer than limits.{}_s allows, which is {:?}", self.name, self.most);
+        let waited = *self.waited.lock();
+        if waited >= WAITED_MIN {
+            let _ = write!(
+                message,
+                "; for {:.1} s of it others had their turns: send fewer scans that fail at once, or send it again later",
+                waited.as_secs_f64()
+            );
+        }
         ServiceError { message, ..error }
     }
 }
@@ -100,6 +114,18 @@ mod tests {
         assert_eq!(error.reason, Reason::CallerGone);
         let patient = TimeLimit::new("undo_time_max", 3600.0);
         assert_eq!(patient.run(StopSignal::NEVER, |stop| check_not_stopped(stop).map(|()| 1)).unwrap(), 1);
+    }
+
+    #[tokio::test]
+    async fn who_waited_for_others_is_told_how_long() {
+        let limit = TimeLimit::new("insertion_time_max", 0.2);
+        let error = limit.wait(std::future::pending::<()>()).await.unwrap_err();
+        assert!(error.message.contains("insertion_time_max_s allows"), "{}", error.message);
+        assert!(error.message.contains("s of it others had their turns"), "{}", error.message);
+        let at_once = TimeLimit::new("insertion_time_max", 0.0);
+        at_once.wait(std::future::ready(())).await.unwrap();
+        let error = at_once.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
+        assert!(!error.message.contains("others"), "{}", error.message);
     }
 
     #[test]
