@@ -8,8 +8,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use super::log;
 use super::{
     block, check, classify, completions, config, delete, doctor, events, export, frontiers, grid, health,
-    insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot, undo,
-    watch,
+    import, insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot,
+    undo, watch,
 };
 use crate::demo::Demo;
 use mrol::build_info;
@@ -72,6 +72,7 @@ enum Command {
     Snapshot(snapshot::TakeSnapshots),
     Restore(snapshot::Restore),
     Export(export::Export),
+    Import(import::Import),
     Doctor(doctor::Doctor),
     Config(config::Settings),
     Completions(completions::Completions),
@@ -126,6 +127,7 @@ impl Command {
             Self::Snapshot(snapshot) => runtime::block_on(snapshot.run(output)),
             Self::Restore(restore) => runtime::block_on(restore.run(output)),
             Self::Export(export) => runtime::block_on(export.run(output)),
+            Self::Import(import) => import.run(output),
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
             Self::Completions(completions) => completions.run(CommandLine::command(), &output),

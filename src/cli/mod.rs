@@ -18,6 +18,7 @@ mod export;
 mod frontiers;
 mod grid;
 mod health;
+mod import;
 mod insert;
 mod keepout;
 mod key;

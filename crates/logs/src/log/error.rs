@@ -34,7 +34,7 @@ pub enum LogError {
     /// A format that this program was built without.
     #[error(
         "databases are read by programs that were built with the feature `bags`, as the released ones are: \
-             in a checkout, `cargo install --path . --features bags`; or make MCAP of it by `ros2 bag convert`"
+             in a checkout, `cargo install --path . --features released`; or make MCAP of it by `ros2 bag convert`"
     )]
     NoDatabases,
     /// The file cannot be read.

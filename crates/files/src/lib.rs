@@ -1,0 +1,15 @@
+//! Maps as files of other mapping programs, read and written.
+//!
+//! ```text
+//! file_kind        which program a file is of, by its extension
+//! mapped_points    points to the voxels and moments of a map, part by part
+//! ```
+//!
+//! Everything here reads what others wrote. Counts are compared with the bytes that are there before anything is
+//! allocated by them, and trees are walked to a fixed depth.
+
+mod file_kind;
+mod mapped_points;
+
+pub use file_kind::{FileKind, LackingFeature};
+pub use mapped_points::MappedPoints;

@@ -1,0 +1,8 @@
+//! `mrol export`: a map as a file of another program.
+
+mod cloud;
+mod command;
+mod exported;
+mod source;
+
+pub(super) use command::Export;

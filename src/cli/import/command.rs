@@ -1,0 +1,108 @@
+//! The command `mrol import`.
+
+use std::path::{Path, PathBuf};
+
+use uuid::Uuid;
+
+use super::cloud;
+use super::imported::{Imported, ImportedLine};
+use mrol::console::{CliError, OriginChoice, Output, parse};
+use mrol_files::FileKind;
+use mrol_map::map::{LEVELS_DEFAULT, MapOrigin, MapSettings};
+use mrol_map::scan::Columns;
+use mrol_store::{Disk, Snapshot};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol import hall.ply --resolution 0.1 --out hall.mrol       a point cloud in the map frame
+  mrol import site.pcd --resolution 0.1 --origin auto --out site.mrol      in the coordinates of a survey
+
+Points become the voxels that they fall in. The map is one at revision 1 without scans: what a scan saw through is known of
+scans alone, so that all space around the voxels is unknown. `mrol restore` puts the map on a running server.";
+
+/// Make a map of what another program mapped: .ply .pcd
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Import {
+    /// The file to read; its extension says what it holds
+    #[arg(value_name = "FILE")]
+    pub(super) file: PathBuf,
+    /// Side of a finest voxel, meters: needed for points
+    #[arg(long, value_name = "METERS")]
+    pub(super) resolution: Option<f64>,
+    /// Number of levels, each twice as coarse as the one before: 1 to 12
+    #[arg(long, default_value_t = LEVELS_DEFAULT)]
+    pub(super) levels: u32,
+    /// The map file to write
+    #[arg(long, value_name = "FILE.mrol")]
+    out: PathBuf,
+    /// Where the map's origin lies in the coordinates of points: "x y z", or auto for the first point. It is subtracted
+    /// from them in double precision, and kept in the map
+    #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
+    pub(super) origin: Option<OriginChoice>,
+    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
+    #[arg(long, value_name = "NAMES")]
+    pub(super) columns: Option<Columns>,
+}
+
+impl Import {
+    pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
+        check_folder(&self.out)?;
+        let kind = FileKind::of(&self.file).map(FileKind::checked).transpose().map_err(CliError::usage)?;
+        let imported = match kind {
+            Some(FileKind::Ply | FileKind::Pcd) | None => cloud::read(&self, &output),
+            Some(FileKind::Bt | FileKind::Ot | FileKind::Npz) => Err(self.unknown()),
+            Some(FileKind::Las | FileKind::Laz | FileKind::E57) => Err(self.unknown()),
+        }?;
+        if imported.contents.voxels.is_empty() {
+            let file = self.file.display();
+            return Err(CliError::failed(format!(
+                "{file}: nothing in it is occupied: there is no map to write"
+            )));
+        }
+        let line = ImportedLine::of(&self.out, &imported);
+        let Imported { settings, contents } = imported;
+        Snapshot { uuid: Uuid::new_v4(), settings, contents }.write(&Disk::default(), &self.out)?;
+        output.print(&line)?;
+        let out = self.out.display();
+        output.say(format!("`mrol restore {out}` puts the map on a running server"))
+    }
+
+    /// Settings of a map of voxels of `resolution_m`.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub(super) fn settings(
+        &self,
+        resolution_m: f64,
+        origin: Option<MapOrigin>,
+    ) -> Result<MapSettings, CliError> {
+        let settings = MapSettings { origin, ..MapSettings::new(resolution_m, self.levels) };
+        settings.checked().map_err(CliError::usage)
+    }
+
+    /// Side of a finest voxel, which a file of points does not say.
+    pub(super) fn resolution_of_points(&self) -> Result<f64, CliError> {
+        self.resolution.ok_or_else(|| {
+            CliError::usage(
+                "--resolution METERS is needed: a file of points does not say how large voxels are",
+            )
+        })
+    }
+
+    fn unknown(&self) -> CliError {
+        CliError::usage(format!("{}: such files are not read", self.file.display()))
+    }
+}
+
+/// Checks that the folder of an output file exists, so that a long run does not fail at its end.
+fn check_folder(path: &Path) -> Result<(), CliError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match folder.is_dir() {
+        true => Ok(()),
+        false => {
+            let (path, folder) = (path.display(), folder.display());
+            Err(CliError::failed(format!("{path}: there is no folder {folder}: make it first")))
+        }
+    }
+}
