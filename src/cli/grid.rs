@@ -7,14 +7,18 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::remote::MapOptions;
+use super::remote::ServerOptions;
 use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::count;
 use mrol::console::parse;
+use mrol::offline::grid_of;
+use mrol_client::Client;
+use mrol_map::map::MapName;
 use mrol_map::planning::{BandFrom, Grid, GridArea};
 use mrol_service::{GridQuestion, GridScope};
+use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -22,6 +26,7 @@ EXAMPLES:
   mrol grid --map office --band \"0.1 1.8\" --cell 0.1 --area \"0 0 10 8\" --out office.pgm
   mrol grid --map office --out office.pgm --unknown               free is only what scans saw through
   mrol grid --map office --band \"-1.6 0\" --band-from map --out office.pgm
+  mrol grid hall.mrol --band \"0.1 1.8\" --out hall.pgm            of a map file, no server needed
 
 The band counts from the floor: in each column of voxels from the top of those that the floor lies in. It is found below the poses
 of the robots and followed from there, up and down ramps. What it does not reach, as the cells of a wall, has the floor of a cell
@@ -39,8 +44,14 @@ const IMAGE: &str = "pgm";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DrawGrid {
+    /// A map file, as `mrol map --out` and `mrol snapshot` write it
+    #[arg(value_name = "FILE.mrol", required_unless_present = "name", conflicts_with = "name")]
+    file: Option<PathBuf>,
+    /// Instead of a file: the name of a map on a server
+    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
+    name: Option<MapName>,
     #[command(flatten)]
-    map: MapOptions,
+    server: ServerOptions,
     /// Where to write the image, a PGM; the description gets the same name with .yaml
     #[arg(long, value_name = "FILE.pgm")]
     out: PathBuf,
@@ -65,7 +76,7 @@ pub(super) struct DrawGrid {
 
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, out, band, band_from, area, cell, unknown, asked } = self;
+        let Self { file, name, server, out, band, band_from, area, cell, unknown, asked } = self;
         check_is_image(&out)?;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope {
@@ -76,8 +87,11 @@ impl DrawGrid {
             tells_unknown: unknown,
         };
         let question = GridQuestion { asked: asked.scope(), scope };
-        let client = map.server.connect().await?;
-        let (grid, versions) = client.whole_grid(&map.name, question).await?;
+        let (grid, voxel_m, revisions) = match (&file, &name) {
+            (Some(file), _) => drawn_of_file(file, &question)?,
+            (None, Some(name)) => drawn_of_server(&server.connect().await?, name, question).await?,
+            (None, None) => return Err(CliError::usage("a map file or --map is needed")),
+        };
         if grid.cells() == 0 {
             let message =
                 "the map has no voxel in this band: there is nothing to draw; give --area, or another --band";
@@ -85,15 +99,37 @@ impl DrawGrid {
         }
         let description = write_files(&grid, &out)?;
         if grid.floor_m.is_some() {
-            let voxel_m = client.map_info(&map.name).await?.settings.resolution_m
-                * f64::from(1 << question.asked.level);
+            let voxel_m = voxel_m * f64::from(1 << question.asked.level);
             let low_m = 2.0 * voxel_m;
             output.note(format!(
                 "what is lower than {low_m:.2} m above the floor, two voxels, may be taken for floor"
             ));
         }
-        output.print(&Drawn::of(&grid, &out, &description, versions.map(|version| version.revision)))
+        output.print(&Drawn::of(&grid, &out, &description, revisions))
     }
+}
+
+/// The grid of a map file, the side of its finest voxels in meters, and the revisions of its first and its last part.
+type DrawnOf = (Grid, f64, [u64; 2]);
+
+fn drawn_of_file(file: &Path, question: &GridQuestion) -> Result<DrawnOf, CliError> {
+    let snapshot = Snapshot::read(&Disk::default(), file)?;
+    let (voxel_m, revision) = (snapshot.settings.resolution_m, snapshot.contents.revision);
+    if question.asked.min_revision.is_some_and(|least| revision < least) {
+        let file = file.display();
+        return Err(CliError::failed(format!("{file} is of revision {revision}, before --min-revision")));
+    }
+    Ok((grid_of(snapshot, question)?, voxel_m, [revision; 2]))
+}
+
+async fn drawn_of_server(
+    client: &Client,
+    name: &MapName,
+    question: GridQuestion,
+) -> Result<DrawnOf, CliError> {
+    let (grid, versions) = client.whole_grid(name, question).await?;
+    let voxel_m = client.map_info(name).await?.settings.resolution_m;
+    Ok((grid, voxel_m, versions.map(|version| version.revision)))
 }
 
 /// Refuses an image of another format: `map_server` reads it by its name.

@@ -10,6 +10,7 @@ mod local;
 mod localize;
 mod logs;
 mod questions;
+mod recordings;
 mod remote;
 #[path = "../support/mod.rs"]
 mod support;

@@ -21,12 +21,14 @@ pub enum FileKind {
     Laz,
     /// Scans of a survey of the ASTM.
     E57,
+    /// A log, which viewers of logs show: written only, since logs have commands of their own.
+    Mcap,
 }
 
 impl FileKind {
     /// All kinds, in the order in which messages name them.
-    pub const ALL: [Self; 8] =
-        [Self::Ply, Self::Pcd, Self::Bt, Self::Ot, Self::Npz, Self::Las, Self::Laz, Self::E57];
+    pub const ALL: [Self; 9] =
+        [Self::Ply, Self::Pcd, Self::Bt, Self::Ot, Self::Npz, Self::Las, Self::Laz, Self::E57, Self::Mcap];
 
     /// The kind of the file at `path`, by its extension in either case; none of another extension.
     pub fn of(path: &Path) -> Option<Self> {
@@ -45,6 +47,7 @@ impl FileKind {
             Self::Las => "las",
             Self::Laz => "laz",
             Self::E57 => "e57",
+            Self::Mcap => "mcap",
         }
     }
 
@@ -58,22 +61,26 @@ impl FileKind {
     /// # Errors
     /// Names the feature that is lacking, and what to do.
     pub fn checked(self) -> Result<Self, LackingFeature> {
-        match self {
-            Self::Las | Self::Laz | Self::E57 if !cfg!(feature = "surveys") => {
-                Err(LackingFeature(self.extension()))
-            }
-            _ => Ok(self),
-        }
+        let (feature, is_built) = match self {
+            Self::Las | Self::Laz | Self::E57 => ("surveys", cfg!(feature = "surveys")),
+            Self::Mcap => ("recordings", cfg!(feature = "recordings")),
+            _ => return Ok(self),
+        };
+        let extension = self.extension();
+        if is_built { Ok(self) } else { Err(LackingFeature { extension, feature }) }
     }
 }
 
-/// A kind of file that this program was built without; the payload is its extension.
+/// A kind of file that this program was built without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    ".{0} files are read and written by programs that were built with the feature `surveys`, as the released ones are: \
-     in a checkout, `cargo install --path . --features released`"
+    ".{extension} files take a program that was built with the feature `{feature}`, as the released ones are: in a \
+     checkout, `cargo install --path . --features released`"
 )]
-pub struct LackingFeature(&'static str);
+pub struct LackingFeature {
+    pub(crate) extension: &'static str,
+    pub(crate) feature: &'static str,
+}
 
 #[cfg(test)]
 mod tests {
@@ -91,9 +98,18 @@ mod tests {
     #[test]
     fn a_kind_that_is_not_built_says_what_is_lacking() {
         assert_eq!(FileKind::Bt.checked(), Ok(FileKind::Bt));
-        match FileKind::Las.checked() {
-            Ok(_) => assert!(cfg!(feature = "surveys")),
-            Err(lacking) => assert!(lacking.to_string().starts_with(".las files"), "{lacking}"),
+        for (kind, is_built, told) in [
+            (
+                FileKind::Las,
+                cfg!(feature = "surveys"),
+                ".las files take a program that was built with the feature `surveys`",
+            ),
+            (FileKind::Mcap, cfg!(feature = "recordings"), ".mcap files take"),
+        ] {
+            match kind.checked() {
+                Ok(_) => assert!(is_built, "{kind:?}"),
+                Err(lacking) => assert!(!is_built && lacking.to_string().starts_with(told), "{lacking}"),
+            }
         }
     }
 }

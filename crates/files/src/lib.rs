@@ -3,6 +3,7 @@
 //! ```text
 //! file_kind        which program a file is of, by its extension
 //! mapped_points    points to the voxels and moments of a map, part by part
+//! recording        a map as a log, which viewers of logs show
 //! ```
 //!
 //! Everything here reads what others wrote. Counts are compared with the bytes that are there before anything is
@@ -10,6 +11,8 @@
 
 mod file_kind;
 mod mapped_points;
+mod recording;
 
 pub use file_kind::{FileKind, LackingFeature};
 pub use mapped_points::MappedPoints;
+pub use recording::{RecordedPose, Recorder, RecordingError, begin_recording};

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::cloud;
 use super::exported::Exported;
+use super::recording;
 use super::source::Source;
 use crate::cli::remote::ServerOptions;
 use mrol::console::{CliError, Output, parse};
@@ -15,6 +16,7 @@ EXAMPLES:
   mrol export hall.mrol --out hall.ply                a map file, as `mrol map` and `mrol snapshot` write it
   mrol export --map office --out office.pcd           a map of a server
   mrol export --map office --level 2 --out far.ply    one point for each voxel four times as large
+  mrol export hall.mrol --out hall.mcap               voxels, grid and ways of the robots, for Foxglove
 
 A .ply or .pcd file has a point at the center of each occupied voxel of the level, x y z as float32 in the map frame, meters,
 binary and little-endian. The origin of a map of a survey is printed and not added: float32 would round the sums. The file is
@@ -35,6 +37,9 @@ pub(crate) struct Export {
     /// Level of the voxels: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Of a .mcap: lowest and highest height above the floor, meters, of what its grid shows
+    #[arg(long, value_name = "Z Z", allow_hyphen_values = true, value_parser = parse::band, default_value = "0.1 1.8")]
+    band: [f64; 2],
     /// The file to write; its extension says what it holds
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -49,6 +54,7 @@ impl Export {
             FileKind::Ply | FileKind::Pcd => cloud::write(kind, &self.out, &voxels),
             FileKind::Bt | FileKind::Ot | FileKind::Npz => Err(self.unknown()),
             FileKind::Las | FileKind::Laz | FileKind::E57 => Err(self.unknown()),
+            FileKind::Mcap => recording::write(&self.out, &voxels, source, self.band, &output).await,
         };
         written?;
         output.print(&Exported::of(&self.out, &voxels))

@@ -3,6 +3,7 @@
 mod cloud;
 mod command;
 mod exported;
+mod recording;
 mod source;
 
 pub(super) use command::Export;

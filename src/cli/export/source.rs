@@ -4,9 +4,13 @@ use std::path::Path;
 
 use crate::cli::remote::ServerOptions;
 use mrol::console::CliError;
+use mrol::offline::grid_of;
 use mrol_client::Client;
+use mrol_map::map::MappedScan;
 use mrol_map::map::{MapName, MapOrigin};
+use mrol_map::planning::Grid;
 use mrol_map::voxel::{Lattice, VoxelKey};
+use mrol_service::GridQuestion;
 use mrol_service::ListingRequest;
 use mrol_store::{Disk, Snapshot};
 
@@ -43,6 +47,28 @@ impl Source {
         match self {
             Self::File(snapshot) => Voxels::of_snapshot(snapshot, level),
             Self::Server(client, name) => Voxels::of_server(client, name, level).await,
+        }
+    }
+
+    /// The poses of the scans in the map, in the order of acceptance.
+    ///
+    /// # Errors
+    /// When the server refuses.
+    pub(super) async fn poses(&self) -> Result<Vec<MappedScan>, CliError> {
+        match self {
+            Self::File(snapshot) => Ok(snapshot.contents.trajectory.poses().cloned().collect()),
+            Self::Server(client, name) => Ok(client.trajectory(name, None).await?.poses),
+        }
+    }
+
+    /// The map from above.
+    ///
+    /// # Errors
+    /// When no floor is found where heights count from it, or the server refuses.
+    pub(super) async fn grid(self, question: GridQuestion) -> Result<Grid, CliError> {
+        match self {
+            Self::File(snapshot) => grid_of(*snapshot, &question),
+            Self::Server(client, name) => Ok(client.whole_grid(&name, question).await?.0),
         }
     }
 }

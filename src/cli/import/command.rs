@@ -53,6 +53,10 @@ impl Import {
             Some(FileKind::Ply | FileKind::Pcd) | None => cloud::read(&self, &output),
             Some(FileKind::Bt | FileKind::Ot | FileKind::Npz) => Err(self.unknown()),
             Some(FileKind::Las | FileKind::Laz | FileKind::E57) => Err(self.unknown()),
+            Some(FileKind::Mcap) => {
+                let file = self.file.display();
+                Err(CliError::usage(format!("{file}: a log becomes a map by `mrol map {file}`")))
+            }
         }?;
         if imported.contents.voxels.is_empty() {
             let file = self.file.display();
