@@ -1,0 +1,5 @@
+//! Files that others wrote, files that others read, and damaged ones.
+
+mod damaged_octrees;
+mod octrees;
+mod support;
