@@ -3,6 +3,7 @@
 //! ```text
 //! file_kind        which program a file is of, by its extension
 //! octree           OctoMap's .bt and .ot
+//! npz              arrays of numpy
 //! mapped_points    points to the voxels and moments of a map, part by part
 //!   collected_voxels   voxels that come one by one          counted   a file, with the place where reading stands
 //! ```
@@ -14,6 +15,7 @@ mod collected_voxels;
 mod counted;
 mod file_kind;
 mod mapped_points;
+pub mod npz;
 pub mod octree;
 
 pub use file_kind::{FileKind, LackingFeature};

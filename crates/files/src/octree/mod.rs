@@ -22,9 +22,11 @@
 //!
 //! Reading order: `leaf` is a cell and its place in the order of a file; `header`; `reader` gives the leaves of a file
 //! one by one, `voxels` makes voxels of them; an `octree` is made of leaves, and `writer` writes it.
+//! `blocks` are the cells of a box in the order of files.
 //!
 //! Source: Hornung et al., *OctoMap* (Autonomous Robots 2013), section 3.5, and the files that its library writes.
 
+mod blocks;
 mod error;
 mod header;
 mod leaf;
@@ -33,6 +35,7 @@ mod reader;
 mod voxels;
 mod writer;
 
+pub use blocks::{CellBlock, CellBlocks};
 pub use error::OctreeError;
 pub use leaf::{CELL_INDEX_MAX, CELL_INDEX_MIN, CellState, Leaf};
 pub use octree_of_leaves::{LeafError, Octree};
