@@ -6,12 +6,13 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
+use super::exported::Content;
 use super::source::{Source, Voxels};
 use mrol::console::{CliError, Output};
 use mrol_files::{RecordedPose, begin_recording};
 use mrol_map::geometry::Point;
 use mrol_map::map::{MappedScan, RobotName};
-use mrol_map::planning::{BandFrom, GridArea};
+use mrol_map::planning::{BandFrom, Grid, GridArea};
 use mrol_service::{GridQuestion, GridScope, QuestionScope};
 
 /// Time from one pose to the next where nobody says when they were taken, nanoseconds.
@@ -27,7 +28,7 @@ pub(super) async fn write(
     source: Source,
     band_m: [f64; 2],
     output: &Output,
-) -> Result<(), CliError> {
+) -> Result<Content, CliError> {
     let ways = ways_of(&source.poses().await?);
     let begin_ns = ways.values().flatten().map(|pose| pose.stamp_ns).min().unwrap_or_default();
     let scope = GridScope {
@@ -45,14 +46,17 @@ pub(super) async fn write(
     let mut recording = begin_recording(file, begin_ns).map_err(failed)?;
     let centers = voxels.centers_m().map(|center_m| Point::from(Point3::from(center_m)));
     recording.write_voxels(&centers.collect::<Vec<_>>()).map_err(failed)?;
-    match grid {
-        Ok(grid) => recording.write_grid(&grid).map_err(failed)?,
-        Err(error) => output.note(format!("the recording has no grid: {error}")),
+    let grid = grid.inspect_err(|error| output.note(format!("the recording has no grid: {error}"))).ok();
+    if let Some(grid) = &grid {
+        recording.write_grid(grid).map_err(failed)?;
     }
     for (robot, poses) in &ways {
         recording.write_way(robot, poses).map_err(failed)?;
     }
-    recording.finish().map_err(failed)
+    recording.finish().map_err(failed)?;
+    let grid_cells = grid.as_ref().map(Grid::cells);
+    let poses = ways.values().map(Vec::len).sum();
+    Ok(Content::Recording { points: voxels.keys.len(), grid_cells, robots: ways.len(), poses })
 }
 
 /// The poses of each robot in the order of time. Where one has no time, they are a second apart.

@@ -3,6 +3,7 @@
 //! A file is read whole before it is parsed, so that every count it declares can be checked against the bytes
 //! that are there, before anything is allocated for it.
 
+mod array_header;
 mod axis;
 mod bare;
 mod columns;
@@ -22,6 +23,7 @@ mod supported;
 mod tests;
 mod text;
 
+pub use array_header::{ArrayHeader, ArrayHeaderError};
 pub use columns::{Columns, ColumnsError};
 pub(super) use error::Problem;
 pub use error::ReadError;
