@@ -185,11 +185,11 @@ fn numpy_reads_the_arrays_without_pickle() {
          assert len({tuple(i) for i in a['indices'].tolist()}) == len(a['indices'])\n\
          print({n: (a[n].dtype.str, a[n].shape) for n in a.files}, len(a['indices']), int(a['level']), int(a['revision']))";
     let run = |python: &str| std::process::Command::new(python).args(["-c", script, &out]).output().ok();
-    let ran = ["python3", "/usr/bin/python3"].into_iter().filter_map(run);
+    let mut ran = ["python3", "/usr/bin/python3"].into_iter().filter_map(run);
     let has_numpy = |ran: &std::process::Output| {
         !String::from_utf8_lossy(&ran.stderr).contains("No module named 'numpy'")
     };
-    let Some(ran) = ran.filter(has_numpy).next() else { return skipped("no python3 with numpy") };
+    let Some(ran) = ran.find(has_numpy) else { return skipped("no python3 with numpy") };
     let said = String::from_utf8_lossy(&ran.stdout);
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     let count = some_voxels().len();
