@@ -9,6 +9,7 @@ mod help;
 mod local;
 mod localize;
 mod logs;
+mod pose_files;
 mod questions;
 mod remote;
 #[path = "../support/mod.rs"]
