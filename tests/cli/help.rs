@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 31] = [
+const COMMANDS: [&str; 33] = [
     "serve",
     "demo",
     "map",
@@ -29,6 +29,8 @@ const COMMANDS: [&str; 31] = [
     "key",
     "snapshot",
     "restore",
+    "export",
+    "import",
     "doctor",
     "config",
     "watch",

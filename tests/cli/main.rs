@@ -5,6 +5,7 @@ mod broken_connections;
 mod demo;
 mod doctor;
 mod errors;
+mod files;
 mod help;
 mod local;
 mod localize;

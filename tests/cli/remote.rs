@@ -296,7 +296,7 @@ fn a_map_is_exported_as_points_that_are_read_back_the_same_from_a_file_and_a_ser
     }
     let refused = |level: &str, out: &str| complaint(&["export", &map, "--level", level, "--out", out], 2);
     assert!(refused("6", &path("b.ply")).contains("--level must be 0 to 5, got 6"));
-    assert!(refused("0", &path("b.obj")).contains("--out must end in .ply or .pcd"));
+    assert!(refused("0", &path("b.obj")).contains("--out must end in one of .ply .pcd .bt .ot .npz"));
 }
 
 #[test]

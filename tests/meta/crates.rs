@@ -37,6 +37,12 @@ fn logs_are_read_on_the_core_alone() {
 }
 
 #[test]
+fn files_of_other_programs_are_read_on_the_core_alone() {
+    let others = ["tokio", "tonic", "prost", "serde", "mrol-store", "mrol-service", "mrol-logs"];
+    check_without("mrol-files", &others);
+}
+
+#[test]
 fn planners_compile_no_server() {
     let server = ["mrol", "axum", "clap", "utoipa", "figment", "metrics", "tonic-health", "tonic-reflection"];
     check_without("mrol-client", &server);

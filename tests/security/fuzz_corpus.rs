@@ -58,4 +58,4 @@ macro_rules! replayed {
     };
 }
 
-replayed!(journal record map_file ply pcd text log config keys grpc http);
+replayed!(journal record map_file ply pcd text log octree arrays config keys grpc http);

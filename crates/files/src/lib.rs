@@ -2,14 +2,21 @@
 //!
 //! ```text
 //! file_kind        which program a file is of, by its extension
+//! octree           OctoMap's .bt and .ot
+//! npz              arrays of numpy
 //! mapped_points    points to the voxels and moments of a map, part by part
+//!   collected_voxels   voxels that come one by one          counted   a file, with the place where reading stands
 //! ```
 //!
 //! Everything here reads what others wrote. Counts are compared with the bytes that are there before anything is
 //! allocated by them, and trees are walked to a fixed depth.
 
+mod collected_voxels;
+mod counted;
 mod file_kind;
 mod mapped_points;
+pub mod npz;
+pub mod octree;
 
 pub use file_kind::{FileKind, LackingFeature};
 pub use mapped_points::MappedPoints;

@@ -2,11 +2,10 @@
 
 use hashbrown::HashMap;
 
+use crate::collected_voxels::CollectedVoxels;
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapContents, MapSettings};
-use mrol_map::voxel::{
-    BlockMask, Lattice, LatticeFromPoints, MomentSet, Moments, SettingError, VoxelKey, VoxelSet,
-};
+use mrol_map::voxel::{Lattice, LatticeFromPoints, MomentSet, Moments, SettingError, VoxelKey, VoxelSet};
 
 /// Points that are worked on at once.
 const POINTS_AT_ONCE: usize = 1 << 16;
@@ -17,7 +16,7 @@ const POINTS_AT_ONCE: usize = 1 << 16;
 #[derive(Debug)]
 pub struct MappedPoints {
     lattice_from_map: LatticeFromPoints,
-    blocks: HashMap<VoxelKey, BlockMask>,
+    voxels: CollectedVoxels,
     /// None of a map that keeps no moments.
     moments: Option<HashMap<VoxelKey, Moments>>,
     beyond: usize,
@@ -31,7 +30,7 @@ impl MappedPoints {
     pub fn new(settings: MapSettings) -> Result<Self, SettingError> {
         Ok(Self {
             lattice_from_map: Lattice::new(settings.resolution_m, settings.levels)?.from_map(),
-            blocks: HashMap::new(),
+            voxels: CollectedVoxels::default(),
             moments: settings.moments.then(HashMap::new),
             beyond: 0,
         })
@@ -42,10 +41,7 @@ impl MappedPoints {
         for points in points.chunks(POINTS_AT_ONCE) {
             let (voxels, beyond) = VoxelSet::of_points(points, &self.lattice_from_map);
             self.beyond += beyond;
-            for (block, mask) in voxels.blocks() {
-                let of_block = self.blocks.entry(*block).or_default();
-                *of_block = of_block.union(mask);
-            }
+            voxels.blocks().iter().for_each(|(block, mask)| self.voxels.add_block(*block, mask));
             if let Some(moments) = &mut self.moments {
                 let added = MomentSet::of_points(points, &self.lattice_from_map);
                 added.as_slice().iter().for_each(|&(key, added)| *moments.entry(key).or_default() += added);
@@ -62,7 +58,7 @@ impl MappedPoints {
     pub fn into_contents(self) -> MapContents {
         MapContents {
             revision: 1,
-            voxels: self.blocks.into_iter().collect(),
+            voxels: self.voxels.into_set(),
             moments: self.moments.into_iter().flatten().collect(),
             ..MapContents::default()
         }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
+use super::exported::Content;
 use super::source::Voxels;
 use mrol::console::CliError;
 use mrol_files::FileKind;
@@ -14,11 +15,12 @@ use mrol_map::scan::{write_pcd, write_ply};
 ///
 /// # Errors
 /// When the file cannot be written.
-pub(super) fn write(kind: FileKind, out: &Path, voxels: &Voxels) -> Result<(), CliError> {
+pub(super) fn write(kind: FileKind, out: &Path, voxels: &Voxels) -> Result<Content, CliError> {
     let points: Vec<Point> = voxels.centers_m().map(|center_m| Point::from(Point3::from(center_m))).collect();
     let written = match kind {
         FileKind::Pcd => write_pcd(out, &points),
         _ => write_ply(out, &points),
     };
-    written.map_err(CliError::writing(out))
+    written.map_err(CliError::writing(out))?;
+    Ok(Content::Centers { points: points.len() })
 }

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::cloud;
-use super::exported::Exported;
+use super::exported::{Content, Exported};
+use super::octree::MapOctree;
 use super::source::Source;
+use super::{cloud, npz};
 use crate::cli::remote::ServerOptions;
 use mrol::console::{CliError, Output, parse};
 use mrol_files::FileKind;
@@ -15,12 +16,18 @@ EXAMPLES:
   mrol export hall.mrol --out hall.ply                a map file, as `mrol map` and `mrol snapshot` write it
   mrol export --map office --out office.pcd           a map of a server
   mrol export --map office --level 2 --out far.ply    one point for each voxel four times as large
+  mrol export hall.mrol --out hall.bt                 an octree of OctoMap, with free space
+  mrol export hall.mrol --out hall.npz                arrays for numpy.load
 
-A .ply or .pcd file has a point at the center of each occupied voxel of the level, x y z as float32 in the map frame, meters,
-binary and little-endian. The origin of a map of a survey is printed and not added: float32 would round the sums. The file is
-a picture of the map: scans, trajectory and free space are in map files alone, which `mrol snapshot` writes.";
+.ply and .pcd have a point at the center of each occupied voxel of the level, x y z as float32 in the map frame, meters,
+binary and little-endian. The origin of a map of a survey is printed and not added: float32 would round the sums.
+.bt and .ot are octrees of OctoMap whose cells are the voxels of the level. A cell is free if `mrol classify` says so of its
+center; only cells in the box around the occupied ones are asked, and keep-outs do not count. The probabilities of .ot
+are OctoMap's limits for occupied and free: nobody measured them.
+.npz has the arrays points (float64, in the coordinates of the survey), indices, resolution, origin, level and revision.
+The file is a picture of the map: scans and trajectory are in map files alone, which `mrol snapshot` writes.";
 
-/// Write a map as a file of other programs: .ply or .pcd
+/// Write a map as a file of other programs: .ply .pcd .bt .ot .npz
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Export {
@@ -35,6 +42,9 @@ pub(crate) struct Export {
     /// Level of the voxels: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Leave free space out of .bt and .ot: occupied cells alone
+    #[arg(long)]
+    no_free: bool,
     /// The file to write; its extension says what it holds
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -43,15 +53,22 @@ pub(crate) struct Export {
 impl Export {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         let kind = self.kind()?;
-        let source = Source::open(self.file.as_deref(), self.name.clone(), &self.server).await?;
+        let mut source = Source::open(self.file.as_deref(), self.name.clone(), &self.server).await?;
         let voxels = source.voxels(self.level).await?;
-        let written = match kind {
-            FileKind::Ply | FileKind::Pcd => cloud::write(kind, &self.out, &voxels),
-            FileKind::Bt | FileKind::Ot | FileKind::Npz => Err(self.unknown()),
-            FileKind::Las | FileKind::Laz | FileKind::E57 => Err(self.unknown()),
+        let content = match kind {
+            FileKind::Ply | FileKind::Pcd => cloud::write(kind, &self.out, &voxels)?,
+            FileKind::Npz => npz::write(&self.out, &voxels, &output)?,
+            FileKind::Bt | FileKind::Ot if self.no_free => {
+                Content::Octree(MapOctree::occupied(&voxels)?.write(kind, &self.out)?)
+            }
+            FileKind::Bt | FileKind::Ot => {
+                let free_space = source.free_space(&voxels)?;
+                let tree = MapOctree::with_free_space(&voxels, &free_space, &output).await?;
+                Content::Octree(tree.write(kind, &self.out)?)
+            }
+            FileKind::Las | FileKind::Laz | FileKind::E57 => return Err(self.unknown()),
         };
-        written?;
-        output.print(&Exported::of(&self.out, &voxels))
+        output.print(&Exported::of(&self.out, content, &voxels))
     }
 
     /// What is to be written.

@@ -13,7 +13,8 @@ use mrol::console::count;
 #[derive(Serialize)]
 pub(super) struct Exported {
     out: String,
-    points: usize,
+    #[serde(flatten)]
+    content: Content,
     level: u32,
     resolution_m: f64,
     revision: u64,
@@ -21,12 +22,38 @@ pub(super) struct Exported {
     origin_m: Option<[f64; 3]>,
 }
 
+/// What is in the file.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(super) enum Content {
+    /// The centers of voxels in the map frame.
+    Centers { points: usize },
+    /// Arrays of voxels.
+    Arrays { voxels: usize },
+    /// A tree of cells.
+    Octree(OctreeCells),
+}
+
+/// Cells of a tree.
+#[derive(Serialize)]
+pub(super) struct OctreeCells {
+    /// Occupied ones.
+    pub(super) occupied: u64,
+    /// Free ones.
+    pub(super) free: u64,
+    /// Leaves that all of them were joined to.
+    pub(super) leaves: usize,
+    /// True of a tree of probabilities, which nobody measured.
+    #[serde(skip)]
+    pub(super) has_probabilities: bool,
+}
+
 impl Exported {
-    /// A point cloud of the centers of voxels.
-    pub(super) fn of(out: &Path, voxels: &Voxels) -> Self {
+    /// A file of voxels.
+    pub(super) fn of(out: &Path, content: Content, voxels: &Voxels) -> Self {
         Self {
             out: out.display().to_string(),
-            points: voxels.keys.len(),
+            content,
             level: voxels.level,
             resolution_m: voxels.resolution_m,
             revision: voxels.revision,
@@ -37,15 +64,37 @@ impl Exported {
 
 impl Display for Exported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { out, points, resolution_m, revision, .. } = self;
-        let points = count(*points);
-        write!(
-            f,
-            "{out}: {points} points, the centers of voxels of {resolution_m} m, at revision {revision}"
-        )?;
-        if let Some([x, y, z]) = self.origin_m {
-            write!(f, "; add {x} {y} {z} for the coordinates of the survey")?;
+        let Self { out, content, resolution_m, revision, .. } = self;
+        match content {
+            Content::Centers { points } => {
+                let points = count(*points);
+                write!(
+                    f,
+                    "{out}: {points} points, the centers of voxels of {resolution_m} m, at revision {revision}"
+                )?;
+            }
+            Content::Arrays { voxels } => {
+                let voxels = count(*voxels);
+                write!(f, "{out}: {voxels} voxels of {resolution_m} m as arrays, at revision {revision}")?;
+            }
+            Content::Octree(OctreeCells { occupied, free, leaves, has_probabilities }) => {
+                let (occupied, free) = (count(*occupied as usize), count(*free as usize));
+                let leaves = count(*leaves);
+                write!(
+                    f,
+                    "{out}: {occupied} occupied and {free} free cells of {resolution_m} m in {leaves} leaves, at \
+                     revision {revision}"
+                )?;
+                if *has_probabilities {
+                    write!(f, "; probabilities are OctoMap's limits for occupied and free, not measured")?;
+                }
+            }
         }
-        Ok(())
+        match (content, self.origin_m) {
+            (Content::Centers { .. } | Content::Octree(_), Some([x, y, z])) => {
+                write!(f, "; add {x} {y} {z} for the coordinates of the survey")
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -3,6 +3,9 @@
 mod cloud;
 mod command;
 mod exported;
+mod free_space;
+mod npz;
+mod octree;
 mod source;
 
 pub(super) use command::Export;

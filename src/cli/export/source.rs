@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use super::free_space::FreeSpace;
 use crate::cli::remote::ServerOptions;
 use mrol::console::CliError;
 use mrol_client::Client;
-use mrol_map::map::{MapName, MapOrigin};
+use mrol_map::map::{MapName, MapOrigin, MapSettings};
 use mrol_map::voxel::{Lattice, VoxelKey};
 use mrol_service::ListingRequest;
 use mrol_store::{Disk, Snapshot};
@@ -45,11 +46,30 @@ impl Source {
             Self::Server(client, name) => Voxels::of_server(client, name, level).await,
         }
     }
+
+    /// What knows which cells of the level of some voxels are free.
+    ///
+    /// # Errors
+    /// When the settings of a map file are out of range.
+    pub(super) fn free_space(&mut self, voxels: &Voxels) -> Result<FreeSpace<'_>, CliError> {
+        match self {
+            Self::File(snapshot) => {
+                // Its voxels are not asked for again.
+                let contents = std::mem::take(&mut snapshot.contents);
+                FreeSpace::of_contents(snapshot.settings, contents, voxels.level)
+            }
+            Self::Server(client, name) => {
+                Ok(FreeSpace::of_server(client, name, voxels.level, voxels.revision))
+            }
+        }
+    }
 }
 
 /// The occupied voxels of a level of a map.
 pub(super) struct Voxels {
     pub(super) level: u32,
+    /// Levels of the map.
+    pub(super) levels: u32,
     /// Side of a voxel of the level, meters.
     pub(super) resolution_m: f64,
     pub(super) revision: u64,
@@ -70,6 +90,7 @@ impl Voxels {
         let keys = contents.voxels.iter().map(|key| key.ancestor(level)).collect();
         Ok(Self {
             level,
+            levels: settings.levels,
             resolution_m: lattice.resolution_m(level),
             revision: contents.revision,
             origin: settings.origin,
@@ -78,10 +99,10 @@ impl Voxels {
     }
 
     async fn of_server(client: &Client, name: &MapName, level: u32) -> Result<Self, CliError> {
-        let origin = client.map_info(name).await?.settings.origin;
+        let MapSettings { origin, levels, .. } = client.map_info(name).await?.settings;
         let listing = client.list_voxels(name, ListingRequest::of(level, None)).await?;
         let (resolution_m, revision) = (listing.resolution_m, listing.version.revision);
-        Ok(Self { level, resolution_m, revision, origin, keys: ascending(listing.keys) })
+        Ok(Self { level, levels, resolution_m, revision, origin, keys: ascending(listing.keys) })
     }
 
     /// The centers of the voxels in the map frame, meters.

@@ -1,4 +1,6 @@
-//! Maps of point clouds: every scan file that a map reads, in the map frame or the coordinates of a survey.
+//! Maps of points: every scan file that a map reads, in the map frame or the coordinates of a survey.
+
+use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,6 +9,7 @@ use super::imported::Imported;
 use mrol::console::{CliError, Output, Survey, count};
 use mrol_files::MappedPoints;
 use mrol_map::geometry::Point;
+use mrol_map::map::MapSettings;
 use mrol_map::scan::{PointFilter, read_exact_points_by};
 
 /// The map of a point cloud. Points that are not finite, or at exactly 0 0 0, are left out and told.
@@ -14,25 +17,84 @@ use mrol_map::scan::{PointFilter, read_exact_points_by};
 /// # Errors
 /// When the file cannot be read, or f32 holds its points too coarsely.
 pub(super) fn read(import: &Import, output: &Output) -> Result<Imported, CliError> {
-    let file = import.file.as_path();
-    let resolution_m = import.resolution_of_points()?;
-    import.settings(resolution_m, None)?;
-    let mut points = read_exact_points_by(file, import.columns)?;
-    let all = points.len();
-    points.retain(|point| is_return(point));
-    if points.len() < all {
-        let left_out = count(all - points.len());
-        output.note(format!("{left_out} points are left out: not finite, or at exactly 0 0 0"));
+    let mut map = PointMap::new(import)?;
+    map.add(&read_exact_points_by(&import.file, import.columns)?)?;
+    Ok(map.finish(output))
+}
+
+/// A map of points that come part by part, in the coordinates of a file.
+pub(super) struct PointMap<'a> {
+    import: &'a Import,
+    resolution_m: f64,
+    /// None until the first point that counts, near which the origin may lie.
+    begun: Option<Begun>,
+    /// Points that are not finite, or at exactly 0 0 0.
+    no_returns: usize,
+}
+
+struct Begun {
+    settings: MapSettings,
+    survey: Survey,
+    points: MappedPoints,
+}
+
+impl<'a> PointMap<'a> {
+    /// A map without points.
+    ///
+    /// # Errors
+    /// When the resolution is not given, or a setting is out of range.
+    pub(super) fn new(import: &'a Import) -> Result<Self, CliError> {
+        let resolution_m = import.resolution_of_points()?;
+        import.settings(resolution_m, None)?;
+        Ok(Self { import, resolution_m, begun: None, no_returns: 0 })
     }
-    let origin = import.origin.map(|choice| choice.origin(file, &points)).transpose()?;
-    let settings = import.settings(resolution_m, origin)?;
-    let near = Survey::of(&points, origin, false, resolution_m).near(&file.display().to_string(), &points)?;
-    let mut mapped = MappedPoints::new(settings).map_err(CliError::usage)?;
-    mapped.add(&near);
-    if mapped.beyond() > 0 {
-        output.note(format!("{} points are left out: beyond the map's range", count(mapped.beyond())));
+
+    /// Adds points of the file, meters.
+    ///
+    /// # Errors
+    /// When f32 holds them too coarsely, once the origin was subtracted.
+    pub(super) fn add(&mut self, points: &[Point3<f64>]) -> Result<(), CliError> {
+        let returns: Vec<Point3<f64>> = points.iter().copied().filter(is_return).collect();
+        self.no_returns += points.len() - returns.len();
+        if returns.is_empty() {
+            return Ok(());
+        }
+        let file = self.import.file.as_path();
+        let begun = match &mut self.begun {
+            Some(begun) => begun,
+            none => none.insert(Begun::of(self.import, self.resolution_m, file, &returns)?),
+        };
+        begun.points.add(&begun.survey.near(&file.display().to_string(), &returns)?);
+        Ok(())
     }
-    Ok(Imported { settings, contents: mapped.into_contents() })
+
+    /// The map, once the points that were left out were told.
+    pub(super) fn finish(self, output: &Output) -> Imported {
+        if self.no_returns > 0 {
+            let left_out = count(self.no_returns);
+            output.note(format!("{left_out} points are left out: not finite, or at exactly 0 0 0"));
+        }
+        let Some(Begun { settings, points, .. }) = self.begun else {
+            let settings = MapSettings::new(self.resolution_m, self.import.levels);
+            return Imported { settings, contents: Default::default() };
+        };
+        if points.beyond() > 0 {
+            let beyond = count(points.beyond());
+            output.note(format!(
+                "{beyond} points are left out: beyond the range of a map, 1,048,576 voxels each way"
+            ));
+        }
+        Imported { settings, contents: points.into_contents() }
+    }
+}
+
+impl Begun {
+    fn of(import: &Import, resolution_m: f64, file: &Path, first: &[Point3<f64>]) -> Result<Self, CliError> {
+        let origin = import.origin.map(|choice| choice.origin(file, first)).transpose()?;
+        let settings = import.settings(resolution_m, origin)?;
+        let survey = Survey::of(first, origin, false, resolution_m);
+        Ok(Self { settings, survey, points: MappedPoints::new(settings).map_err(CliError::usage)? })
+    }
 }
 
 /// True of a point that drivers do not write for "nothing returned".

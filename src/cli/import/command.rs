@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use uuid::Uuid;
 
-use super::cloud;
 use super::imported::{Imported, ImportedLine};
+use super::{cloud, npz, octree};
 use mrol::console::{CliError, OriginChoice, Output, parse};
 use mrol_files::FileKind;
 use mrol_map::map::{LEVELS_DEFAULT, MapOrigin, MapSettings};
@@ -14,20 +14,30 @@ use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
+  mrol import building.bt --out building.mrol                 an octree of OctoMap: its occupied cells
+  mrol import building.bt --resolution 0.16 --out coarse.mrol     two of its cells a voxel
+  mrol import hall.npz --out hall.mrol                        arrays of numpy, as `mrol export` writes them
   mrol import hall.ply --resolution 0.1 --out hall.mrol       a point cloud in the map frame
   mrol import site.pcd --resolution 0.1 --origin auto --out site.mrol      in the coordinates of a survey
 
-Points become the voxels that they fall in. The map is one at revision 1 without scans: what a scan saw through is known of
-scans alone, so that all space around the voxels is unknown. `mrol restore` puts the map on a running server.";
+Points become the voxels that they fall in, occupied cells the voxels that they are. Free cells and probabilities are left
+out: a map knows free space by what its scans saw through, and this one is at revision 1 without scans. `mrol restore`
+puts it on a running server, where robots localize in it and add to it.";
 
-/// Make a map of what another program mapped: .ply .pcd
+/// How many levels coarser than its file a map may be.
+const COARSER_MAX: u32 = 15;
+/// How far a resolution that is asked for may lie from one that a map has, as a share of it.
+const SIDE_ERROR_MAX: f64 = 1e-6;
+
+/// Make a map of what another program mapped: .bt .ot .npz .ply .pcd
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Import {
     /// The file to read; its extension says what it holds
     #[arg(value_name = "FILE")]
     pub(super) file: PathBuf,
-    /// Side of a finest voxel, meters: needed for points
+    /// Side of a finest voxel, meters: needed for points. Of a file of voxels as wide as those, or 2, 4, 8 and so on times
+    /// as wide [default: as wide as the file's voxels]
     #[arg(long, value_name = "METERS")]
     pub(super) resolution: Option<f64>,
     /// Number of levels, each twice as coarse as the one before: 1 to 12
@@ -51,7 +61,8 @@ impl Import {
         let kind = FileKind::of(&self.file).map(FileKind::checked).transpose().map_err(CliError::usage)?;
         let imported = match kind {
             Some(FileKind::Ply | FileKind::Pcd) | None => cloud::read(&self, &output),
-            Some(FileKind::Bt | FileKind::Ot | FileKind::Npz) => Err(self.unknown()),
+            Some(FileKind::Bt | FileKind::Ot) => octree::read(&self, &output),
+            Some(FileKind::Npz) => npz::read(&self, &output),
             Some(FileKind::Las | FileKind::Laz | FileKind::E57) => Err(self.unknown()),
         }?;
         if imported.contents.voxels.is_empty() {
@@ -88,6 +99,37 @@ impl Import {
                 "--resolution METERS is needed: a file of points does not say how large voxels are",
             )
         })
+    }
+
+    /// Side of a finest voxel of a map of a file whose voxels are `side_m` wide, and how many levels coarser that is.
+    ///
+    /// # Errors
+    /// When the resolution that is asked for is not `side_m` times a power of two.
+    pub(super) fn resolution_of_voxels(&self, side_m: f64) -> Result<(f64, u32), CliError> {
+        let Some(asked_m) = self.resolution else { return Ok((side_m, 0)) };
+        let coarser = (0..=COARSER_MAX).find(|&coarser| {
+            let resolution_m = side_m * f64::from(1_u32 << coarser);
+            (resolution_m - asked_m).abs() <= resolution_m * SIDE_ERROR_MAX
+        });
+        let coarser = coarser.ok_or_else(|| {
+            CliError::usage(format!(
+                "--resolution: the file's voxels are {side_m} m wide, and those of the map are as wide, or 2, 4, 8 and so \
+                 on times as wide, got {asked_m}; without --resolution they are as wide"
+            ))
+        })?;
+        Ok((side_m * f64::from(1_u32 << coarser), coarser))
+    }
+
+    /// Refuses options that a file of voxels has no use for.
+    pub(super) fn refuse_options_of_points(&self) -> Result<(), CliError> {
+        let given = [("--origin", self.origin.is_some()), ("--columns", self.columns.is_some())];
+        match given.into_iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => {
+                let file = self.file.display();
+                Err(CliError::usage(format!("{option}: for files of points, and {file} has voxels")))
+            }
+            None => Ok(()),
+        }
     }
 
     fn unknown(&self) -> CliError {

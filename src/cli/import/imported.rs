@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use mrol::console::count;
+use mrol::console::{CliError, count};
 use mrol_map::map::{MapContents, MapSettings};
 
 /// A map that was made of a file.
@@ -51,4 +51,10 @@ impl Display for ImportedLine {
         }
         Ok(())
     }
+}
+
+/// The error of a file, which names it.
+pub(super) fn in_file<E: Display>(path: &Path) -> impl FnOnce(E) -> CliError {
+    let path = path.display().to_string();
+    move |problem| CliError::failed(format!("{path}: {problem}"))
 }

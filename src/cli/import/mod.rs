@@ -3,5 +3,7 @@
 mod cloud;
 mod command;
 mod imported;
+mod npz;
+mod octree;
 
 pub(super) use command::Import;

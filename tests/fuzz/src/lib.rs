@@ -5,6 +5,7 @@ mod frames;
 mod journal;
 mod log;
 mod map_file;
+mod map_files;
 mod map_state;
 mod record;
 mod scan_files;
@@ -16,7 +17,7 @@ mod simulated;
 pub type Target = fn(&[u8]);
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 7] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("journal", journal::journal),
     ("record", record::record),
     ("map_file", map_file::map_file),
@@ -24,6 +25,8 @@ pub const TARGETS: [(&str, Target); 7] = [
     ("pcd", scan_files::pcd),
     ("text", scan_files::text),
     ("log", log::log),
+    ("octree", map_files::octree),
+    ("arrays", map_files::arrays),
 ];
 
 /// Calls the target of that name.

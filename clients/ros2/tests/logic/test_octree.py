@@ -8,6 +8,7 @@ import pytest
 
 from mrol_ros.octree import FREE, OCCUPIED, Leaves, octree_cells, octree_data
 
+FIXTURES = Path(__file__).resolve().parents[4] / "crates/files/tests/fixtures"
 SHARED = Path(os.environ.get("MROL_SHARED", Path(__file__).resolve().parents[4] / "../shared")) / "data/octomap/geb079.bt"
 
 
@@ -71,6 +72,16 @@ def test_bytes_that_are_no_tree_are_refused():
     for broken in (data[:-2], data + b"\0\0", b"\x03\0" * 40):
         with pytest.raises(ValueError, match="tree"):
             octree_cells(broken)
+
+
+def test_a_tree_of_octomap_has_the_leaves_that_it_lists_and_comes_back_byte_for_byte():
+    # The program reads and writes the same file.
+    _, _, tree = (FIXTURES / "certain.bt").read_bytes().partition(b"\ndata\n")
+    cells = octree_cells(tree)
+    listed = [line.split() for line in (FIXTURES / "leaves.txt").read_text().splitlines()]
+    states = {"free": FREE, "occupied": OCCUPIED}
+    assert {tuple(cell) for cell in cells.tolist()} == {(*map(int, at), states[state]) for *at, state in listed}
+    assert octree_data(list(leaves_of(cells))) == (tree, 0)
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason=f"{SHARED} is not there")

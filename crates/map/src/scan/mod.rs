@@ -13,7 +13,7 @@ mod uos_pose;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
-pub use reader::{Columns, ColumnsError, ReadError};
+pub use reader::{ArrayHeader, ArrayHeaderError, Columns, ColumnsError, ReadError};
 pub use reader::{
     compare_names, parse_points, read_exact_points, read_exact_points_by, read_points, scan_files,
 };

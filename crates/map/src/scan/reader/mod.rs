@@ -3,6 +3,7 @@
 //! A file is read whole before it is parsed, so that every count it declares can be checked against the bytes
 //! that are there, before anything is allocated for it.
 
+mod array_header;
 mod axis;
 mod bare;
 mod columns;
@@ -23,6 +24,7 @@ mod tests;
 mod text;
 mod uos;
 
+pub use array_header::{ArrayHeader, ArrayHeaderError};
 pub use columns::{Columns, ColumnsError};
 pub(super) use error::Problem;
 pub use error::ReadError;

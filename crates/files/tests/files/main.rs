@@ -1,0 +1,6 @@
+//! Files that others wrote, files that others read, and damaged ones.
+
+mod arrays;
+mod damaged_octrees;
+mod octrees;
+mod support;

@@ -1,0 +1,31 @@
+//! Voxels as arrays of numpy.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use super::exported::Content;
+use super::source::Voxels;
+use mrol::console::{CliError, Output};
+use mrol_files::npz::VoxelArrays;
+
+/// Writes the centers and the indices of voxels.
+///
+/// # Errors
+/// When the file cannot be written.
+pub(super) fn write(out: &Path, voxels: &Voxels, output: &Output) -> Result<Content, CliError> {
+    let Voxels { level, resolution_m, revision, origin, keys, .. } = voxels;
+    let arrays = VoxelArrays {
+        keys,
+        resolution_m: *resolution_m,
+        origin: *origin,
+        level: *level,
+        revision: *revision,
+    };
+    let output = output.clone().with_bar_of(2 * keys.len(), "rows");
+    let file = File::create(out).map_err(CliError::writing(out))?;
+    let written = arrays.write(BufWriter::new(file), |rows| output.advance_to(rows as u64));
+    output.clear_bar();
+    written.map_err(CliError::writing(out))?;
+    Ok(Content::Arrays { voxels: keys.len() })
+}
