@@ -15,6 +15,7 @@ mod questions;
 mod remote;
 #[path = "../support/mod.rs"]
 mod support;
+mod surveys;
 
 use assert_cmd::Command;
 use serde_json::Value;

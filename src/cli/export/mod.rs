@@ -7,5 +7,6 @@ mod free_space;
 mod npz;
 mod octree;
 mod source;
+mod survey;
 
 pub(super) use command::Export;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use uuid::Uuid;
 
 use super::imported::{Imported, ImportedLine};
-use super::{cloud, npz, octree};
+use super::{cloud, e57, las, npz, octree};
 use mrol::console::{CliError, OriginChoice, Output, parse};
 use mrol_files::FileKind;
 use mrol_map::map::{LEVELS_DEFAULT, MapOrigin, MapSettings};
@@ -19,17 +19,19 @@ EXAMPLES:
   mrol import hall.npz --out hall.mrol                        arrays of numpy, as `mrol export` writes them
   mrol import hall.ply --resolution 0.1 --out hall.mrol       a point cloud in the map frame
   mrol import site.pcd --resolution 0.1 --origin auto --out site.mrol      in the coordinates of a survey
+  mrol import site.laz --resolution 0.1 --origin auto --out site.mrol      a survey, and so of .las
+  mrol import site.e57 --resolution 0.1 --origin auto --out site.mrol      its scans, and what they saw through
 
 Points become the voxels that they fall in, occupied cells the voxels that they are. Free cells and probabilities are left
-out: a map knows free space by what its scans saw through, and this one is at revision 1 without scans. `mrol restore`
-puts it on a running server, where robots localize in it and add to it.";
+out: a map knows free space by what its scans saw through, and this one is at revision 1 without scans, but for one of an
+.e57 file. `mrol restore` puts it on a running server, where robots localize in it and add to it.";
 
 /// How many levels coarser than its file a map may be.
 const COARSER_MAX: u32 = 15;
 /// How far a resolution that is asked for may lie from one that a map has, as a share of it.
 const SIDE_ERROR_MAX: f64 = 1e-6;
 
-/// Make a map of what another program mapped: .bt .ot .npz .ply .pcd
+/// Make a map of what another program mapped: .bt .ot .npz .ply .pcd .las .laz .e57
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Import {
@@ -53,6 +55,10 @@ pub(crate) struct Import {
     /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
     #[arg(long, value_name = "NAMES")]
     pub(super) columns: Option<Columns>,
+    /// Take the scans of an .e57 file as points alone [default: where each scan has a pose, it is a scan of the map, and
+    /// what it saw through is free]
+    #[arg(long)]
+    pub(super) as_points: bool,
 }
 
 impl Import {
@@ -63,7 +69,8 @@ impl Import {
             Some(FileKind::Ply | FileKind::Pcd) | None => cloud::read(&self, &output),
             Some(FileKind::Bt | FileKind::Ot) => octree::read(&self, &output),
             Some(FileKind::Npz) => npz::read(&self, &output),
-            Some(FileKind::Las | FileKind::Laz | FileKind::E57) => Err(self.unknown()),
+            Some(FileKind::Las | FileKind::Laz) => las::read(&self, &output),
+            Some(FileKind::E57) => e57::read(&self, &output),
         }?;
         if imported.contents.voxels.is_empty() {
             let file = self.file.display();
@@ -130,10 +137,6 @@ impl Import {
             }
             None => Ok(()),
         }
-    }
-
-    fn unknown(&self) -> CliError {
-        CliError::usage(format!("{}: such files are not read", self.file.display()))
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod cloud;
 mod command;
+mod e57;
 mod imported;
+mod las;
 mod npz;
 mod octree;
 

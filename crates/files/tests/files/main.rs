@@ -4,3 +4,5 @@ mod arrays;
 mod damaged_octrees;
 mod octrees;
 mod support;
+#[cfg(feature = "surveys")]
+mod surveys;
