@@ -38,8 +38,8 @@ pub(crate) struct Import {
     /// The file to read; its extension says what it holds
     #[arg(value_name = "FILE")]
     pub(super) file: PathBuf,
-    /// Side of a finest voxel, meters: needed for points. Of a file of voxels as wide as those, or 2, 4, 8 and so on times
-    /// as wide [default: as wide as the file's voxels]
+    /// Side of a finest voxel, meters: needed for points. Of a file of voxels as wide as those, or 2, 4, 8 and so on
+    /// times as wide [default: as wide as the file's voxels]
     #[arg(long, value_name = "METERS")]
     pub(super) resolution: Option<f64>,
     /// Number of levels, each twice as coarse as the one before: 1 to 12

@@ -30,8 +30,8 @@ pub struct VoxelArrays<'a> {
 }
 
 impl VoxelArrays<'_> {
-    /// Writes the arrays; equal voxels give equal files. Calls `progress` with the voxels that were written, of twice as
-    /// many as there are: first the points, then the indices.
+    /// Writes the arrays; equal voxels give equal files. Calls `progress` with the rows that were written, of twice as
+    /// many as there are voxels: first the points, then the indices.
     ///
     /// # Errors
     /// When the file cannot be written.

@@ -12,7 +12,8 @@ use super::voxels::VOXELS_MAX;
 pub enum OctreeError {
     /// The file is no octree.
     #[error(
-        "no octree of OctoMap: its first line is {0:?}, where \"# Octomap OcTree binary file\" or \"# Octomap OcTree file\" is needed"
+        "no octree of OctoMap: its first line is {0:?}, where \"# Octomap OcTree binary file\" or \"# Octomap OcTree file\" \
+         is needed"
     )]
     NoOctree(String),
     /// A line of the header is not as the format says.
@@ -28,7 +29,8 @@ pub enum OctreeError {
     Lacking(&'static str),
     /// A tree of a type whose nodes are unknown.
     #[error(
-        "a tree of type {0}: OcTree, OcTreeStamped and ColorOcTree are read; `convert_octree` of OctoMap makes an OcTree of others"
+        "a tree of type {0}: OcTree, OcTreeStamped and ColorOcTree are read; `convert_octree` of OctoMap makes an OcTree \
+         of others"
     )]
     Type(String),
     /// Cells that no map can have.

@@ -25,7 +25,8 @@ pub(super) struct PackedLeaf(u64);
 pub enum LeafError {
     /// The leaf lies outside of every tree.
     #[error(
-        "cell {index:?} of level {level} lies beyond an octree, whose finest cells have indices from {CELL_INDEX_MIN} to {CELL_INDEX_MAX}"
+        "cell {index:?} of level {level} lies beyond an octree, whose finest cells have indices from {CELL_INDEX_MIN} to \
+         {CELL_INDEX_MAX}"
     )]
     Outside {
         /// Its indices.
@@ -96,8 +97,8 @@ impl Octree {
         Ok(tree)
     }
 
-    /// Adds a leaf behind all others, in the order of files: the first finest cells of leaves ascend as interleaved bits
-    /// of z, y and x.
+    /// Adds a leaf behind all others, in the order of files: the first finest cells of leaves ascend as the interleaved
+    /// bits of z, y and x.
     ///
     /// # Errors
     /// When the leaf lies outside of every tree, or not behind the others.

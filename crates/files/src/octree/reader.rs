@@ -9,8 +9,8 @@ use crate::counted::Counted;
 
 /// The leaves of a file, ascending in the order of the file: `.bt` and `.ot`, told apart by their first line.
 ///
-/// Holds the path to a leaf, whatever the file claims. Probabilities become states as OctoMap does it: log-odds of 0 and
-/// above are occupied.
+/// Holds the path to a leaf, whatever the file claims. Probabilities become states as OctoMap does it: log-odds of 0
+/// and above are occupied.
 #[derive(Debug)]
 pub struct OctreeReader<R> {
     file: Counted<R>,

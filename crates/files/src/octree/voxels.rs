@@ -26,13 +26,14 @@ pub struct OctreeVoxels {
 }
 
 impl OctreeVoxels {
-    /// Reads a tree to its end. A voxel is `2^coarser` cells wide, at most 2^15, and occupied where one of its cells is.
+    /// Reads a tree to its end. A voxel is `2^coarser` cells wide, at most 2^15, and occupied where one of its cells
+    /// is.
     ///
     /// Calls `progress` now and then with the bytes that were read.
     ///
     /// # Errors
-    /// When the file is no tree to its end, or its occupied cells are more than [`VOXELS_MAX`] voxels: this is found out
-    /// before they are made.
+    /// When the file is no tree to its end, or its occupied cells are more than [`VOXELS_MAX`] voxels: this is found
+    /// out before they are made.
     pub fn read(
         reader: &mut OctreeReader<impl BufRead>,
         coarser: u32,

@@ -20,8 +20,8 @@ impl Octree {
         self.write(NodeFormat::States, resolution_m, file)
     }
 
-    /// Writes the tree as `.ot`, with cells of `resolution_m`: cells are as certain as OctoMap lets them be, inner nodes
-    /// as the most certain of their children.
+    /// Writes the tree as `.ot`, with cells of `resolution_m`: cells are as certain as OctoMap lets them be, inner
+    /// nodes as likely occupied as the most likely of their children.
     ///
     /// # Errors
     /// When the file cannot be written.

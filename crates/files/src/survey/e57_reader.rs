@@ -71,8 +71,8 @@ pub struct E57Points<'a> {
 }
 
 impl E57Points<'_> {
-    /// The next points in the frame of the scan, meters, at most `points_max`; none after the last one. Those whose state
-    /// says that they have no place, directions and invalid ones, are left out and counted.
+    /// The next points in the frame of the scan, meters, at most `points_max`; none after the last one. Those whose
+    /// state says that they have no place, directions and invalid ones, are left out and counted.
     ///
     /// # Errors
     /// When the file ends before its last point, or is damaged.

@@ -6,8 +6,8 @@ use e57::{E57Writer, Record, RecordValue};
 
 use super::error::SurveyError;
 
-/// Writes points as the one scan of a file, Cartesian coordinates in double precision, meters. `guid` is an identity that
-/// no other file has.
+/// Writes points as the one scan of a file, Cartesian coordinates in double precision, meters. `guid` is an identity
+/// that no other file has.
 ///
 /// # Errors
 /// When the file cannot be written.
