@@ -55,8 +55,8 @@ pub(crate) struct Import {
     /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
     #[arg(long, value_name = "NAMES")]
     pub(super) columns: Option<Columns>,
-    /// Take the scans of an .e57 file as points alone [default: where each scan has a pose, it is a scan of the map, and
-    /// what it saw through is free]
+    /// Take the scans of an .e57 file as points alone [default: where each scan has a pose, it is a scan of the map,
+    /// and what it saw through is free]
     #[arg(long)]
     pub(super) as_points: bool,
 }

@@ -16,7 +16,8 @@ const SCALES_M: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 /// Writes points of the map frame, meters, as LAS 1.2, points of format 0, in the coordinates of the survey.
 ///
 /// The origin is the offset of the file, and is added in double precision. `extent_m` is the largest absolute
-/// coordinate of the points. Coordinates have steps of 0.1 mm up to an extent of 214 km, and ten times as much for ten times the extent.
+/// coordinate of the points. Coordinates have steps of 0.1 mm up to an extent of 214 km, and ten times as much for ten
+/// times the extent.
 ///
 /// # Errors
 /// When the file cannot be written, or there are more points, or wider ones, than the format holds.
