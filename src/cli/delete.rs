@@ -49,7 +49,7 @@ pub(super) struct Delete {
 #[derive(Debug, clap::Args)]
 #[group(required = true, multiple = false)]
 struct Target {
-    /// The voxels of a file's points: .ply .pcd .xyz .npy .bin .f32
+    /// The voxels of a file's points: .ply .pcd .xyz .npy .bin .f32 .3d
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// The voxel of a point, meters; may be repeated

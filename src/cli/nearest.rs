@@ -28,7 +28,7 @@ The radius is 64 voxels of the level at most. A point inside of an occupied voxe
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Nearest {
-    /// Points to ask about: .ply .pcd .xyz .npy .bin .f32
+    /// Points to ask about: .ply .pcd .xyz .npy .bin .f32 .3d
     #[arg(required_unless_present = "point", conflicts_with = "point")]
     points_file: Option<PathBuf>,
     /// A point to ask about, meters; may be repeated

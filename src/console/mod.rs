@@ -18,7 +18,7 @@ pub mod truth;
 
 pub use map_report::{MapReport, bytes, count, percent};
 pub use statistics::Statistics;
-pub use truth::true_poses;
+pub use truth::{poses_of_scans, true_poses};
 
 pub use self::credentials::CredentialOptions;
 pub use self::error::CliError;

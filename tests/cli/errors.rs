@@ -18,7 +18,7 @@ fn files_that_are_no_scans_are_named() {
     assert!(map(&path).contains("unsupported extension \"las\""));
     // The file is looked at before a server is asked.
     let insert = complaint(&["insert", &path, "--map", "a", "--server", "http://127.0.0.1:9"], 1);
-    assert!(insert.contains("supported are .ply .pcd .xyz .npy .bin .f32"), "{insert}");
+    assert!(insert.contains("supported are .ply .pcd .xyz .npy .bin .f32 .3d"), "{insert}");
     let (_folder, path) = file("scan.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n");
     assert!(map(&path).contains("scan.ply"));
     let (_folder, path) = file("scan.f32", &[0; 13]);

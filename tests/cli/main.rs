@@ -10,11 +10,13 @@ mod help;
 mod local;
 mod localize;
 mod logs;
+mod pose_files;
 mod questions;
 mod recordings;
 mod remote;
 #[path = "../support/mod.rs"]
 mod support;
+mod surveys;
 
 use assert_cmd::Command;
 use serde_json::Value;

@@ -4,6 +4,7 @@
 //! file_kind        which program a file is of, by its extension
 //! octree           OctoMap's .bt and .ot
 //! npz              arrays of numpy
+//! survey           LAS, LAZ and E57, with the feature `surveys`
 //! mapped_points    points to the voxels and moments of a map, part by part
 //!   collected_voxels   voxels that come one by one          counted   a file, with the place where reading stands
 //! recording        a map as a log, which viewers of logs show
@@ -19,6 +20,7 @@ mod mapped_points;
 pub mod npz;
 pub mod octree;
 mod recording;
+pub mod survey;
 
 pub use file_kind::{FileKind, LackingFeature};
 pub use mapped_points::MappedPoints;

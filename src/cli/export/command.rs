@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::exported::{Content, Exported};
 use super::octree::MapOctree;
 use super::source::Source;
-use super::{cloud, npz, recording};
+use super::{cloud, npz, recording, survey};
 use crate::cli::remote::ServerOptions;
 use mrol::console::{CliError, Output, parse};
 use mrol_files::FileKind;
@@ -18,6 +18,7 @@ EXAMPLES:
   mrol export --map office --level 2 --out far.ply    one point for each voxel four times as large
   mrol export hall.mrol --out hall.bt                 an octree of OctoMap, with free space
   mrol export hall.mrol --out hall.npz                arrays for numpy.load
+  mrol export site.mrol --out site.laz                a survey, in its coordinates; .las and .e57 too
   mrol export hall.mrol --out hall.mcap               voxels, grid and ways of the robots, for Foxglove
 
 .ply and .pcd have a point at the center of each occupied voxel of the level, x y z as float32 in the map frame, meters,
@@ -25,11 +26,13 @@ binary and little-endian. The origin of a map of a survey is printed and not add
 .bt and .ot are octrees of OctoMap whose cells are the voxels of the level. A cell is free if `mrol classify` says so of its
 center; only cells in the box around the occupied ones are asked, and keep-outs do not count. The probabilities of .ot
 are OctoMap's limits for occupied and free: nobody measured them.
+.las, .laz and .e57 have the same centers in the coordinates of the survey: the map's origin is added in double precision. LAS
+is 1.2 with steps of 0.1 mm up to 214 km from the origin, E57 has one scan in double precision without a pose.
 .npz has the arrays points (float64, in the coordinates of the survey), indices, resolution, origin, level and revision.
 .mcap has voxels, a grid, the ways of the robots and their frames as messages of ROS 2.
 The file is a picture of the map: scans and trajectory are in map files alone, which `mrol snapshot` writes.";
 
-/// Write a map as a file of other programs: .ply .pcd .bt .ot .npz .mcap
+/// Write a map as a file of other programs: .ply .pcd .bt .ot .npz .las .laz .e57 .mcap
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Export {
@@ -71,7 +74,9 @@ impl Export {
                 let tree = MapOctree::with_free_space(&voxels, &free_space, &output).await?;
                 Content::Octree(tree.write(kind, &self.out)?)
             }
-            FileKind::Las | FileKind::Laz | FileKind::E57 => return Err(self.unknown()),
+            FileKind::Las | FileKind::Laz | FileKind::E57 => {
+                survey::write(kind, &self.out, &voxels, &output)?
+            }
             FileKind::Mcap => recording::write(&self.out, &voxels, source, self.band, &output).await?,
         };
         output.print(&Exported::of(&self.out, content, &voxels))

@@ -28,6 +28,8 @@ pub(super) struct Exported {
 pub(super) enum Content {
     /// The centers of voxels in the map frame.
     Centers { points: usize },
+    /// The centers of voxels in the coordinates of the survey.
+    Survey { points: usize },
     /// Arrays of voxels.
     Arrays { voxels: usize },
     /// Messages.
@@ -75,7 +77,7 @@ impl Display for Exported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { out, content, resolution_m, revision, .. } = self;
         match content {
-            Content::Centers { points } => {
+            Content::Centers { points } | Content::Survey { points } => {
                 let points = count(*points);
                 write!(
                     f,
@@ -110,6 +112,9 @@ impl Display for Exported {
             }
         }
         match (content, self.origin_m) {
+            (Content::Survey { .. }, Some([x, y, z])) => {
+                write!(f, "; the origin {x} {y} {z} is added to them")
+            }
             (Content::Centers { .. } | Content::Octree(_) | Content::Recording { .. }, Some([x, y, z])) => {
                 write!(f, "; add {x} {y} {z} for the coordinates of the survey")
             }

@@ -8,5 +8,6 @@ mod npz;
 mod octree;
 mod recording;
 mod source;
+mod survey;
 
 pub(super) use command::Export;

@@ -2,8 +2,11 @@
 
 mod cloud;
 mod command;
+mod e57;
 mod imported;
+mod las;
 mod npz;
 mod octree;
+mod options;
 
 pub(super) use command::Import;

@@ -12,7 +12,7 @@ use crate::cli::log::LogOptions;
 use crate::cli::maps::OptionalSettings;
 use crate::cli::remote::MapOptions;
 use crate::cli::scan_report::tell_order;
-use mrol::console::{CliError, OriginChoice, Output, Survey, parse, true_poses};
+use mrol::console::{CliError, OriginChoice, Output, Survey, parse, poses_of_scans};
 use mrol_client::{Client, NewMap, new_session};
 use mrol_map::geometry::Pose;
 use mrol_map::map::{MapOrigin, RobotName, SessionName};
@@ -40,7 +40,7 @@ then has the --session and --first-scan-id with which the same command goes on, 
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Insert {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
+    /// .f32 .3d; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
@@ -71,8 +71,9 @@ pub(crate) struct Insert {
     pub(super) alignment: AlignmentOptions,
     #[command(flatten)]
     pub(super) points: PointOptions,
-    /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
-    #[arg(long, value_name = "FILE", visible_alias = "poses", conflicts_with = "guess")]
+    /// Put every scan at its pose, without aligning: a file of TUM (8 numbers a line) or of KITTI (12), line k for scan
+    /// k, or a folder with the .pose file of 3DTK for each scan
+    #[arg(long, value_name = "FILE_OR_DIR", visible_alias = "poses", conflicts_with = "guess")]
     pub(super) truth: Option<PathBuf>,
     /// Number the scans from N on, so that a scan that is sent again in the same session is not added twice [default:
     /// from 0, in a new session]
@@ -127,7 +128,7 @@ impl Insert {
             return Err(CliError::usage("--session of scan files needs --first-scan-id"));
         }
         let files = scan_files(&self.scans)?;
-        let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
+        let poses = self.truth.as_ref().map(|path| poses_of_scans(path, &files, &output)).transpose()?;
         let client = self.map.server.connect().await?;
         tell_order(&files, &output)?;
         let survey = self.survey(&client, &files, &output).await?;

@@ -42,7 +42,7 @@ may be 2 degrees off.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Localize {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32
+    /// .f32 .3d
     #[arg(required = true, value_name = "SCAN")]
     scans: Vec<PathBuf>,
     /// A map file, as `mrol map --out` writes it

@@ -13,7 +13,7 @@ use crate::cli::scan_report::{name_of, name_width, tell_order};
 use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
-use mrol::console::true_poses;
+use mrol::console::poses_of_scans;
 use mrol::console::{OriginChoice, Survey};
 use mrol::offline::{KnownScan, Mapper};
 use mrol_map::align::AlignmentSettings;
@@ -30,6 +30,7 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --levels 6 --trajectory-out poses.txt --out hall.mrol
   mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
   mrol map scans/ --resolution 0.1 --poses poses.txt --out hall.mrol      at known poses, without aligning
+  mrol map dat/ --resolution 0.1 --poses dat/ --out dat.mrol              scan000.3d with scan000.pose, as 3DTK has them
   mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
                                                              are the filters ample? (last line)
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
@@ -41,9 +42,8 @@ EXAMPLES:
                                                              serve the map
 
 The first scan goes in at the origin (or --first-pose; or upright, by --axes and --sensor-height), each other one is
-aligned from the last accepted pose; one that does not align is left out, and one without a return is skipped. With --truth line k of the file belongs to
-scan k, and errors are those of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a
-last object \"summary\" is printed when --truth, --poses or --lookup is given. Whether the filters are ample is said
+aligned from the last accepted pose; one that does not align is left out, and one without a return is skipped. With --truth
+errors are those of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first accepted scan. With --json a last object \"summary\" is printed when --truth, --poses or --lookup is given. Whether the filters are ample is said
 when --lookup is given.";
 
 /// Make a map of scans in this process, no server needed
@@ -51,7 +51,7 @@ when --lookup is given.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
+    /// .f32 .3d; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters
@@ -77,15 +77,16 @@ pub(crate) struct Map {
     /// Write the map to a file; `mrol serve` reads those in the folder maps of its data folder
     #[arg(long, value_name = "FILE.mrol")]
     out: Option<PathBuf>,
-    /// True poses, a TUM file: report the errors
-    #[arg(long, value_name = "FILE")]
+    /// True poses: report the errors. A file of TUM (8 numbers a line) or of KITTI (12), line k for scan k, or a folder
+    /// with the .pose file of 3DTK for each scan
+    #[arg(long, value_name = "FILE_OR_DIR")]
     truth: Option<PathBuf>,
     /// Put the scans at their true poses, without aligning
     #[arg(long, requires = "truth", conflicts_with = "first_pose")]
     at_truth: bool,
-    /// Put every scan at its pose in this TUM file, without aligning: the same as --truth FILE --at-truth, and as
+    /// Put every scan at its pose in this file or folder, without aligning: the same as --truth FILE --at-truth, and as
     /// --poses of `mrol insert`
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["truth", "first_pose"])]
+    #[arg(long, value_name = "FILE_OR_DIR", conflicts_with_all = ["truth", "first_pose"])]
     poses: Option<PathBuf>,
     /// Share of a scan's points that must fall in occupied voxels for it to be accepted, beyond what rays say [default:
     /// 0]
@@ -147,7 +148,7 @@ impl Map {
             return self.run_log(path, alignment, filter, output);
         }
         let files = scan_files(&self.scans)?;
-        let truth = self.poses_file().map(|path| true_poses(path, files.len(), &output)).transpose()?;
+        let truth = self.poses_file().map(|path| poses_of_scans(path, &files, &output)).transpose()?;
         self.check_folders()?;
 
         tell_order(&files, &output)?;

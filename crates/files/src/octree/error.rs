@@ -4,8 +4,7 @@ use std::io;
 
 use mrol_map::voxel::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
 
-use super::leaf::DEPTH;
-use super::voxels::VOXELS_MAX;
+use super::leaf::{DEPTH, VOXELS_MAX};
 
 /// Why the octree of a file cannot be read.
 #[derive(Debug, thiserror::Error)]

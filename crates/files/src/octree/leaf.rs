@@ -2,6 +2,8 @@
 
 /// Levels of a tree above its finest cells.
 pub(super) const DEPTH: u32 = 16;
+/// Voxels that are made of a tree, at most: a few bytes of a file claim as many as the tree is large.
+pub const VOXELS_MAX: u64 = 1 << 28;
 /// Smallest index of a finest cell.
 pub const CELL_INDEX_MIN: i32 = -(1 << (DEPTH - 1));
 /// Largest index of a finest cell.

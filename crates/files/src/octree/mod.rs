@@ -37,8 +37,8 @@ mod writer;
 
 pub use blocks::{CellBlock, CellBlocks};
 pub use error::OctreeError;
-pub use leaf::{CELL_INDEX_MAX, CELL_INDEX_MIN, CellState, Leaf};
+pub use leaf::{CELL_INDEX_MAX, CELL_INDEX_MIN, CellState, Leaf, VOXELS_MAX};
 pub use octree_of_leaves::{LeafError, Octree};
 pub use reader::OctreeReader;
-pub use voxels::{OctreeVoxels, VOXELS_MAX};
+pub use voxels::OctreeVoxels;
 pub use writer::{LOG_ODDS_FREE, LOG_ODDS_OCCUPIED};

@@ -5,12 +5,10 @@ use std::io::BufRead;
 use mrol_map::voxel::{BLOCK_LEVELS, VoxelKey, VoxelSet};
 
 use super::error::OctreeError;
-use super::leaf::{CellState, Leaf, cells_of};
+use super::leaf::{CellState, Leaf, VOXELS_MAX, cells_of};
 use super::reader::OctreeReader;
 use crate::collected_voxels::CollectedVoxels;
 
-/// Voxels that are made of a tree, at most: a few bytes of a file claim as many as the tree is large.
-pub const VOXELS_MAX: u64 = 1 << 28;
 /// Leaves between two reports of progress.
 const LEAVES_PER_REPORT: u64 = 1 << 16;
 

@@ -1,12 +1,13 @@
 //! Recordings: a map as messages of ROS 2 in an MCAP file, which Foxglove and other viewers of logs show.
 //!
 //! ```text
-//! recorder         what is recorded
+//! begin            a recording begins               recorder     what is recorded
 //! mcap_recorder    the topics, and what is written to them
 //!   message          the bytes of each message       definition   what fields the messages have
 //!   cdr              numbers and texts in CDR
 //! ```
 
+mod begin;
 #[cfg(feature = "recordings")]
 mod cdr;
 #[cfg(feature = "recordings")]
@@ -19,4 +20,5 @@ mod recorder;
 #[cfg(all(test, feature = "recordings"))]
 mod tests;
 
-pub use recorder::{RecordedPose, Recorder, RecordingError, begin_recording};
+pub use begin::begin_recording;
+pub use recorder::{RecordedPose, Recorder, RecordingError};

@@ -1,6 +1,5 @@
 //! What is recorded of a map, whatever the file.
 
-use std::fs::File;
 use std::io;
 
 use crate::file_kind::LackingFeature;
@@ -10,8 +9,8 @@ use mrol_map::planning::Grid;
 
 /// A map as messages of ROS 2 in a file, all of it in the frame `map`.
 ///
-/// Voxels (`sensor_msgs/PointCloud2`), grid (`nav_msgs/OccupancyGrid`) and ways (`nav_msgs/Path`) stand at its begin, so
-/// that a viewer has them wherever it is; the robots' frames (`tf2_msgs/TFMessage`) have the times of the scans.
+/// Voxels (`sensor_msgs/PointCloud2`), grid (`nav_msgs/OccupancyGrid`) and ways (`nav_msgs/Path`) stand at its begin,
+/// so that a viewer has them wherever it is; the robots' frames (`tf2_msgs/TFMessage`) have the times of the scans.
 pub trait Recorder {
     /// Writes the centers of occupied voxels, in the map frame.
     ///
@@ -59,20 +58,4 @@ pub enum RecordingError {
     /// What is to be written cannot be in such a file; the payload says why.
     #[error("the recording cannot be written: {0}")]
     Format(String),
-}
-
-/// A recording in a new MCAP file, which begins at a time: nanoseconds since the Unix epoch.
-///
-/// # Errors
-/// When the file cannot be written, or this program was built without recordings.
-pub fn begin_recording(file: File, begin_ns: u64) -> Result<Box<dyn Recorder>, RecordingError> {
-    #[cfg(feature = "recordings")]
-    {
-        Ok(Box::new(super::mcap_recorder::McapRecorder::begin(std::io::BufWriter::new(file), begin_ns)?))
-    }
-    #[cfg(not(feature = "recordings"))]
-    {
-        let _ = (file, begin_ns);
-        Err(LackingFeature { extension: "mcap", feature: "recordings" }.into())
-    }
 }

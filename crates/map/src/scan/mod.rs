@@ -3,11 +3,13 @@
 //! A scan is a `Vec<Point>` in its sensor's frame, meters; a point with a NaN or infinite coordinate means "no
 //! return", as does one at exactly 0 0 0, and readers and sensors alike keep it.
 
+mod kitti;
 mod point_filter;
 mod reader;
 mod skipped;
 mod tum;
 mod unit;
+mod uos_pose;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
@@ -16,6 +18,7 @@ pub use reader::{
     compare_names, parse_points, read_exact_points, read_exact_points_by, read_points, scan_files,
 };
 pub use skipped::SkippedPoints;
-pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
+pub use tum::{PoseForm, StampedPose, parse_trajectory, read_poses, read_trajectory, write_trajectory};
 pub use unit::UnitDoubt;
+pub use uos_pose::read_uos_pose;
 pub use writer::{write_f32, write_pcd, write_ply};

@@ -32,7 +32,7 @@ counts. Errors are those against the true poses, where these are known; the map 
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Align {
-    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 [default: simulated scans]
+    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 .3d [default: simulated scans]
     #[arg(value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters

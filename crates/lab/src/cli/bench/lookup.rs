@@ -38,7 +38,7 @@ Answers are checked before the clock runs: none may deny an occupied voxel, exac
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Lookup {
-    /// Make the map of the points in this file: .ply .pcd .xyz .npy .bin .f32
+    /// Make the map of the points in this file: .ply .pcd .xyz .npy .bin .f32 .3d
     #[arg(long, value_name = "FILE", requires_all = ["points", "resolution"], conflicts_with = "workload")]
     voxels: Option<PathBuf>,
     /// Ask about the points in this file

@@ -31,7 +31,7 @@ const SCANS_MAX: usize = 1000;
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Memory {
-    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 [default: the workload]
+    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 .3d [default: the workload]
     #[arg(value_name = "DIR_OR_FILES", requires = "truth")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel of a map of scans, meters

@@ -32,7 +32,7 @@ is unknown here counts as wrong.";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct FreeSpace {
-    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32
+    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 .3d
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// True poses of the scans, a TUM file

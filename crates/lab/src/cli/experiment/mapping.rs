@@ -44,7 +44,7 @@ const ODOMETRY_FILE: &str = "poses_odometry.txt";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Mapping {
-    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32
+    /// Scan files, or folders of them: .ply .pcd .xyz .npy .bin .f32 .3d
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Where to write the results; made if it is not there

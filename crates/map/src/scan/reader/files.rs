@@ -19,8 +19,9 @@ use crate::geometry::Point;
 /// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii, binary,
 /// binary_compressed), `.xyz` (text: the first three columns, or those that a line of names says, divided by spaces,
 /// commas or semicolons; `#`, `//` or `%` starts a comment), `.npy` (an array of shape (..., 3), or with columns behind
-/// x y z), `.bin` (little-endian float32 x y z i), `.f32` (x y z). Points that are not finite are kept: they mean "no
-/// return". Coordinates are rounded to f32, see [`read_exact_points`].
+/// x y z), `.bin` (little-endian float32 x y z i), `.f32` (x y z), `.3d` (text of 3DTK, whose axes and centimeters
+/// become x ahead, y left, z up, meters). Points that are not finite are kept: they mean "no return". Coordinates are
+/// rounded to f32, see [`read_exact_points`].
 ///
 /// # Errors
 /// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated; the

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::{Problem, ReadError};
-use super::{bare, npy, pcd, ply, text};
+use super::{bare, npy, pcd, ply, text, uos};
 
 /// The extension of `path` without its dot, in lower case.
 fn extension(path: &Path) -> String {
@@ -21,6 +21,8 @@ pub(super) enum Format {
     /// x y z and an intensity.
     Bin,
     F32,
+    /// Text of 3DTK.
+    Uos,
 }
 
 impl Format {
@@ -37,6 +39,7 @@ impl Format {
             "npy" => Some(Self::Npy),
             "bin" => Some(Self::Bin),
             "f32" => Some(Self::F32),
+            "3d" => Some(Self::Uos),
             _ => None,
         }
     }
@@ -57,6 +60,7 @@ impl Format {
             Self::Npy => npy::points(bytes, columns),
             Self::Bin => bare::points(bytes, columns, Columns::xyz_and(1)),
             Self::F32 => bare::points(bytes, columns, Columns::xyz_and(0)),
+            Self::Uos => uos::points(bytes, columns),
         }
     }
 }

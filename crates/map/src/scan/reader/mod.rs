@@ -22,6 +22,7 @@ mod supported;
 #[cfg(test)]
 mod tests;
 mod text;
+mod uos;
 
 pub use array_header::{ArrayHeader, ArrayHeaderError};
 pub use columns::{Columns, ColumnsError};
@@ -32,3 +33,4 @@ pub use files::{parse_points, read_exact_points, read_exact_points_by, read_poin
 pub(super) use lines::content_lines;
 pub use natural::compare_names;
 pub(super) use text::number;
+pub(super) use uos::robot_from_uos;

@@ -10,4 +10,4 @@ pub(super) const POINTS_MAX: u64 = 100_000_000;
 pub(super) const HEADER_BYTES_MAX: usize = 1 << 20;
 
 /// The extensions that [`read_points`](super::read_points) knows.
-pub(super) const EXTENSIONS: [&str; 6] = [".ply", ".pcd", ".xyz", ".npy", ".bin", ".f32"];
+pub(super) const EXTENSIONS: [&str; 7] = [".ply", ".pcd", ".xyz", ".npy", ".bin", ".f32", ".3d"];

@@ -29,7 +29,7 @@ fn what_the_writers_write_is_read_again() {
 #[test]
 fn an_unsupported_extension_lists_the_supported_ones() {
     let error = read("las", b"").unwrap_err().to_string();
-    assert!(error.contains("\"las\"") && error.contains(".ply .pcd .xyz .npy .bin .f32"), "{error}");
+    assert!(error.contains("\"las\"") && error.contains(".ply .pcd .xyz .npy .bin .f32 .3d"), "{error}");
     assert!(matches!(read_points(Path::new("scan")), Err(ReadError::Extension { .. })));
     assert_eq!(Format::of(Path::new("SCAN.PLY")), Some(Format::Ply));
 }
