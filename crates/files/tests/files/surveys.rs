@@ -87,6 +87,38 @@ fn scans_of_pye57_have_their_poses_and_leave_out_points_without_a_place() {
 }
 
 #[test]
+fn spherical_coordinates_are_ranges_azimuths_and_elevations() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("spherical.e57");
+    let mut writer = e57::E57Writer::from_file(&path, "{s}").unwrap();
+    let double = |name| e57::Record { name, data_type: e57::RecordDataType::F64 };
+    let state = e57::Record {
+        name: e57::RecordName::SphericalInvalidState,
+        data_type: e57::RecordDataType::Integer { min: 0, max: 2 },
+    };
+    let prototype = vec![
+        double(e57::RecordName::SphericalRange),
+        double(e57::RecordName::SphericalAzimuth),
+        double(e57::RecordName::SphericalElevation),
+        state,
+    ];
+    let mut scan = writer.add_pointcloud("{s0}", prototype).unwrap();
+    let quarter = std::f64::consts::FRAC_PI_2;
+    for (range, azimuth, elevation, state) in
+        [(2.0, quarter, 0.0, 0), (3.0, 0.0, quarter, 0), (4.0, 0.0, 0.0, 1), (5.0, 0.0, 0.0, 2)]
+    {
+        let numbers = [range, azimuth, elevation].map(e57::RecordValue::Double);
+        scan.add_point([&numbers[..], &[e57::RecordValue::Integer(state)]].concat()).unwrap();
+    }
+    scan.finalize().unwrap();
+    writer.finalize().unwrap();
+    let (points, skipped) = e57_points(&path).unwrap().remove(0);
+    assert_eq!((points.len(), skipped), (2, 2));
+    assert!((points[0].coords - Vector3::new(0.0, 2.0, 0.0)).norm() < 1e-12);
+    assert!((points[1].coords - Vector3::new(0.0, 0.0, 3.0)).norm() < 1e-12);
+}
+
+#[test]
 fn what_is_written_comes_back_within_a_tenth_of_a_millimeter() {
     let folder = tempfile::tempdir().unwrap();
     let map_points: Vec<[f64; 3]> =
