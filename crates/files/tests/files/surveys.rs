@@ -30,11 +30,14 @@ fn las_points(path: &Path) -> Result<Vec<Point3<f64>>, SurveyError> {
     }
 }
 
-/// The points of each scan, and how many had no place.
-fn e57_points(path: &Path) -> Result<Vec<(Vec<Point3<f64>>, u64)>, SurveyError> {
+/// The points of a scan, and how many had no place.
+type PointsOfScan = (Vec<Point3<f64>>, u64);
+
+/// The points of each scan.
+fn e57_points(path: &Path) -> Result<Vec<PointsOfScan>, SurveyError> {
     let mut reader = E57Reader::open(path)?;
     let scans = reader.scans()?.len();
-    let read = |k: usize| -> Result<(Vec<Point3<f64>>, u64), SurveyError> {
+    let read = |k: usize| -> Result<PointsOfScan, SurveyError> {
         let mut scan = reader.points(k)?;
         let mut points = Vec::new();
         loop {

@@ -118,6 +118,11 @@ mod tests {
         }
     }
 
+    /// How long a question takes is not what is tested: an emulated processor takes long.
+    fn patient() -> Limits {
+        Limits { question_time_max_s: 600.0, ..Limits::default() }
+    }
+
     fn question(points: Vec<Point>) -> ClassifyQuestion {
         ClassifyQuestion { asked: QuestionScope::default(), points: points.into() }
     }
@@ -135,7 +140,7 @@ mod tests {
         let changes = ChangedBetween(&map, Cell::default());
         let stop = StopSignal::NEVER.giving_way_by(&changes);
         let asked = question(points);
-        let (states, version) = asked.answer_from(&questioned, &Limits::default(), stop).unwrap();
+        let (states, version) = asked.answer_from(&questioned, &patient(), stop).unwrap();
         let words = POINTS_PER_PART / 64;
         assert_eq!(states.points, 2 * POINTS_PER_PART + 1);
         assert!(states.occupied[..2 * words].iter().all(|word| *word == u64::MAX));
@@ -151,7 +156,7 @@ mod tests {
             MultiResolutionMap::restore(MapSettings::new(1.0, 1), MapContents::at(7, VoxelSet::default()));
         let (map, planner) = (Arc::new(map.unwrap()), OnceLock::new());
         let questioned = QuestionTarget::new(&map, &planner, 0);
-        let ask = |points| question(points).answer_from(&questioned, &Limits::default(), StopSignal::NEVER);
+        let ask = |points| question(points).answer_from(&questioned, &patient(), StopSignal::NEVER);
         let mut points = vec![Point::new(0.0, 0.0, 0.0); POINTS_PER_PART + 3];
         points[POINTS_PER_PART + 1] = Point::new(f32::NAN, 0.0, 0.0);
         let error = ask(points).unwrap_err();

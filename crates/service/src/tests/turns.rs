@@ -62,7 +62,9 @@ fn seen_wall() -> MultiResolutionMap {
 
 /// How often a question gives way. What it is answered is the same where it does not, and of the revision before it.
 fn turns_of<Q: Question>(map: &Arc<MultiResolutionMap>, question: &Q) -> u64 {
-    let (planner, limits) = (OnceLock::new(), Limits::default());
+    // How long it takes is not what is tested: an emulated processor takes long.
+    let limits = Limits { question_time_max_s: 600.0, long_question_time_max_s: 600.0, ..Limits::default() };
+    let planner = OnceLock::new();
     let questioned = QuestionTarget::new(map, &planner, limits.planning_field_bytes_max);
     let (alone, _) = question.answer_from(&questioned, &limits, StopSignal::NEVER).unwrap();
     let (turns, revision) = (ChangedBetween { map, turns: Cell::default() }, map.revision());
