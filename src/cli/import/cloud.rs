@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
-use super::command::Import;
 use super::imported::Imported;
+use super::options::ImportOptions;
 use mrol::console::{CliError, Output, Survey, count};
 use mrol_files::MappedPoints;
 use mrol_map::geometry::Point;
@@ -16,7 +16,7 @@ use mrol_map::scan::{PointFilter, read_exact_points_by};
 ///
 /// # Errors
 /// When the file cannot be read, or f32 holds its points too coarsely.
-pub(super) fn read(import: &Import, output: &Output) -> Result<Imported, CliError> {
+pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, CliError> {
     let mut map = PointMap::new(import)?;
     map.add(&read_exact_points_by(&import.file, import.columns)?)?;
     Ok(map.finish(output))
@@ -24,7 +24,7 @@ pub(super) fn read(import: &Import, output: &Output) -> Result<Imported, CliErro
 
 /// A map of points that come part by part, in the coordinates of a file.
 pub(super) struct PointMap<'a> {
-    import: &'a Import,
+    import: &'a ImportOptions,
     resolution_m: f64,
     /// None until the first point that counts, near which the origin may lie.
     begun: Option<Begun>,
@@ -43,7 +43,7 @@ impl<'a> PointMap<'a> {
     ///
     /// # Errors
     /// When the resolution is not given, or a setting is out of range.
-    pub(super) fn new(import: &'a Import) -> Result<Self, CliError> {
+    pub(super) fn new(import: &'a ImportOptions) -> Result<Self, CliError> {
         let resolution_m = import.resolution_of_points()?;
         import.settings(resolution_m, None)?;
         Ok(Self { import, resolution_m, begun: None, no_returns: 0 })
@@ -89,7 +89,12 @@ impl<'a> PointMap<'a> {
 }
 
 impl Begun {
-    fn of(import: &Import, resolution_m: f64, file: &Path, first: &[Point3<f64>]) -> Result<Self, CliError> {
+    fn of(
+        import: &ImportOptions,
+        resolution_m: f64,
+        file: &Path,
+        first: &[Point3<f64>],
+    ) -> Result<Self, CliError> {
         let origin = import.origin.map(|choice| choice.origin(file, first)).transpose()?;
         let settings = import.settings(resolution_m, origin)?;
         let survey = Survey::of(first, origin, false, resolution_m);

@@ -5,5 +5,6 @@ mod command;
 mod imported;
 mod npz;
 mod octree;
+mod options;
 
 pub(super) use command::Import;

@@ -5,9 +5,9 @@ use std::io::BufReader;
 use nalgebra::Point3;
 
 use super::cloud::PointMap;
-use super::command::Import;
 use super::imported::{Imported, in_file};
 use super::octree::open;
+use super::options::ImportOptions;
 use mrol::console::{CliError, Output};
 use mrol_files::npz::{NpzContent, NpzReader};
 use mrol_map::map::{MapContents, MapOrigin};
@@ -16,7 +16,7 @@ use mrol_map::map::{MapContents, MapOrigin};
 ///
 /// # Errors
 /// When the file has neither, is cut off, or the options do not fit it.
-pub(super) fn read(import: &Import, output: &Output) -> Result<Imported, CliError> {
+pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, CliError> {
     let path = import.file.as_path();
     let (file, _) = open(path)?;
     let mut reader = NpzReader::new(BufReader::new(file)).map_err(in_file(path))?;

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
-use super::command::Import;
 use super::imported::{Imported, in_file};
+use super::options::ImportOptions;
 use mrol::console::{CliError, Output, count};
 use mrol_files::octree::{OctreeReader, OctreeVoxels};
 use mrol_map::map::MapContents;
@@ -17,7 +17,7 @@ const BYTES_AT_ONCE: usize = 1 << 20;
 ///
 /// # Errors
 /// When the file is no tree to its end, or the options do not fit it.
-pub(super) fn read(import: &Import, output: &Output) -> Result<Imported, CliError> {
+pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, CliError> {
     let path = import.file.as_path();
     import.refuse_options_of_points()?;
     let (file, bytes) = open(path)?;

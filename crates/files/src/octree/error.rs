@@ -5,7 +5,6 @@ use std::io;
 use mrol_map::voxel::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
 
 use super::leaf::DEPTH;
-use super::voxels::VOXELS_MAX;
 
 /// Why the octree of a file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -61,11 +60,9 @@ pub enum OctreeError {
     /// Something follows the tree.
     #[error("more follows the tree, which ends at byte {0}: the file is damaged, or is several in one")]
     Appended(u64),
-    /// More voxels than a map is made of.
-    #[error(
-        "its occupied cells are more than {VOXELS_MAX} voxels, the limit: take coarser ones by --resolution"
-    )]
-    TooManyVoxels,
+    /// More voxels than a map is made of; the payload is the limit.
+    #[error("its occupied cells are more than {0} voxels, the limit: take coarser ones by --resolution")]
+    TooManyVoxels(u64),
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),

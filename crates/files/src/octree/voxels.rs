@@ -47,7 +47,7 @@ impl OctreeVoxels {
                 CellState::Occupied => {
                     read.occupied += 1;
                     let level = leaf.level.saturating_sub(coarser);
-                    left = left.checked_sub(cells_of(level)).ok_or(OctreeError::TooManyVoxels)?;
+                    left = left.checked_sub(cells_of(level)).ok_or(OctreeError::TooManyVoxels(VOXELS_MAX))?;
                     add(&mut collected, leaf, coarser);
                 }
             }
