@@ -50,6 +50,17 @@ class CloudLayout:
 
 
 @dataclass(frozen=True, eq=False)
+class StampedCloud:
+    """A message with points, as it came."""
+
+    stamp_ns: int
+    frame: str
+    layout: CloudLayout
+    data: Any
+    """A buffer of bytes."""
+
+
+@dataclass(frozen=True, eq=False)
 class Cloud:
     """The points of a message, in its order."""
 

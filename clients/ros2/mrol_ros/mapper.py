@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from threading import Event, Lock
+from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 import mrol
@@ -13,53 +12,21 @@ import numpy as np
 from mrol import Pose, ScanAnswer
 from numpy.typing import NDArray
 
-from .clouds import CloudError, CloudLayout, read_cloud
-from .correction import guess_covariance, moved_covariance
+from .clouds import CloudError, StampedCloud, read_cloud
 from .frames import is_frame_name
-from .gravity import GravityWindow
+from .guesses import INITIAL_POSE_TRIES, Guesses, InitialPose
+from .mapper_state import MapperState
 from .newest import NewestQueue
 from .odometry import Odometry, SensorPlace
 from .options import Options
 from .point_times import NoTimes, TimesRule, find_rule, times_s
 from .server_link import ServerLink
-
-SET_BACK_NS = 1_000_000_000
-"""A stamp farther than this before the last one is of a clock that was set back; a nearer one comes too late."""
-
-REAL_CLOCK_NS = 946_684_800 * 1_000_000_000
-"""Stamps before the year 2000 are of a clock that begins anew with each start."""
-
-FIRST_DISTANCE_MAX_M = 1000.0
-"""Odometry farther from its origin says nothing of where a map begins."""
-
-INITIAL_POSE_TRIES = 10
-"""An initial pose counts until a cloud is accepted, or so many were refused at it."""
+from .stamps import CloudStamps
 
 PAUSE_S = 0.3
 """How long nothing is sent after the server was not reached."""
 
 RETRY_AFTER_MAX_S = 5.0
-
-
-@dataclass(frozen=True, eq=False)
-class StampedCloud:
-    """A message with points, as it came."""
-
-    stamp_ns: int
-    frame: str
-    layout: CloudLayout
-    data: Any
-    """A buffer of bytes."""
-
-
-@dataclass(frozen=True, eq=False)
-class InitialPose:
-    """Where the robot is in the map, as somebody says: `map_from_base`, with its covariance, shape (6, 6), if it is known."""
-
-    map_from_base: Pose
-    covariance: NDArray[np.float64] | None = None
-    stamp_ns: int = 0
-    """When that was so; 0: now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,43 +37,6 @@ class MappedCloud:
     frame: str
     answer: ScanAnswer
     place: SensorPlace
-
-
-@dataclass
-class Counts:
-    """What became of the clouds so far."""
-
-    accepted: int = 0
-    refused: int = 0
-    """Those that did not fit: the map is untouched."""
-    unreadable: int = 0
-    late: int = 0
-    """Those whose stamp is not later than that of the one before."""
-    not_sent: int = 0
-    """Those that the server could not be reached for, or would not take."""
-    repeated: int = 0
-    """Requests that were sent again since their answer was lost."""
-    paused: int = 0
-    without_odometry: int = 0
-    without_times: int = 0
-
-
-@dataclass
-class MapperState:
-    """What diagnostics tell of the mapper."""
-
-    counts: Counts = field(default_factory=Counts)
-    verdict: str = ""
-    """Of the last answer."""
-    reason: str = ""
-    server_error: str = ""
-    """Why the last request had no answer; empty while the server answers."""
-    missing: str = ""
-    """What is missing for a better guess."""
-    needs_pose: bool = False
-    """The server knows no pose of the robot in a map that is not empty."""
-    times: str = ""
-    """How times of points are read, or why there are none."""
 
 
 class Mapper:
@@ -133,8 +63,7 @@ class Mapper:
         """
         self.queue: NewestQueue[StampedCloud] = NewestQueue()
         self.state = MapperState()
-        self.gravity = GravityWindow()
-        self.imu_frame = ""
+        self.guesses = Guesses(options, odometry, robot)
         self.is_paused = False
         self._options = options
         self._link = link
@@ -142,37 +71,12 @@ class Mapper:
         self._on_mapped = on_mapped
         self._note = note
         self._noted: set[str] = set()
-        self._session = options.session or (_own_session() if is_simulated else "")
+        self._stamps = CloudStamps(options.session, is_simulated=is_simulated)
         self._closing = Event()
-        self._lock = Lock()
-        self._robot = robot
-        self._beginning = InitialPose(Pose.of(list(options.initial_pose))) if options.initial_pose else None
-        self._initial: InitialPose | None = self._beginning
-        self._initial_tries = 0
-        self._last_odom_from_sensor: Pose | None = None
-        self._map_from_odom: Pose | None = None
-        self._has_accepted = False
-        self._last_stamp_ns: int | None = None
         given = options.times_rule
         self._times_field: str | None = given[0] if given else None
         self._rule: TimesRule | None = given[1] if given else None
         self.last_cloud: StampedCloud | None = None
-
-    def set_initial_pose(self, pose: InitialPose) -> None:
-        """Takes where the robot is, as somebody says, for the next cloud.
-
-        Raises `ValueError` for a covariance that is none.
-        """
-        if pose.covariance is not None:
-            pose = InitialPose(pose.map_from_base, guess_covariance(pose.covariance), pose.stamp_ns)
-        with self._lock:
-            self._initial, self._initial_tries = pose, 0
-
-    def forget(self) -> None:
-        """Begins anew, as in a map that was made anew."""
-        with self._lock:
-            self._last_odom_from_sensor = self._map_from_odom = None
-            self._has_accepted = False
 
     def run(self) -> None:
         """Sends clouds until it is closed."""
@@ -196,9 +100,14 @@ class Mapper:
             counts.unreadable += 1
             self._note_once("frame", f"a cloud is left out: its header must name a frame, got {cloud.frame[:40]!r}")
             return
-        if not self._is_later(cloud.stamp_ns):
+        verdict = self._stamps.judge(cloud.stamp_ns)
+        if verdict.oddity:
+            self._note_once(verdict.oddity, verdict.text)
+        if not verdict.is_later:
             counts.late += 1
             return
+        if verdict.is_set_back:
+            self.guesses.clock_was_set_back()
         self.last_cloud = cloud
         place = self._odometry.place(cloud.frame, cloud.stamp_ns)
         self.state.missing = place.missing
@@ -213,7 +122,7 @@ class Mapper:
             return
         arguments: dict[str, Any] = {
             "scan_id": cloud.stamp_ns,
-            "session": self._session_of(cloud.stamp_ns),
+            "session": self._stamps.session_of(cloud.stamp_ns),
             "timestamp_ns": cloud.stamp_ns,
             "point_times": seconds,
             "range_min_m": self._options.range_min_m or None,
@@ -227,21 +136,13 @@ class Mapper:
     def _take(self, cloud: StampedCloud, place: SensorPlace, answer: ScanAnswer) -> None:
         state = self.state
         state.verdict, state.reason, state.needs_pose = answer.verdict, answer.reason, False
-        with self._lock:
-            if answer.accepted:
-                state.counts.accepted += 1
-                self._has_accepted, self._last_odom_from_sensor = True, place.odom_from_sensor
-                if place.odom_from_sensor is not None:
-                    self._map_from_odom = answer.map_from_sensor @ place.odom_from_sensor.inverse()
-                self._initial = None
-            else:
-                state.counts.refused += 1
-                self._initial_tries += self._initial is not None
-                if self._initial_tries >= INITIAL_POSE_TRIES:
-                    self._initial, self._initial_tries = None, 0
-                    self._note(
-                        f"{INITIAL_POSE_TRIES} clouds were refused at the initial pose, which counts no more: {answer.reason}"
-                    )
+        if answer.accepted:
+            state.counts.accepted += 1
+            self.guesses.accepted(answer.map_from_sensor, place)
+        else:
+            state.counts.refused += 1
+            if self.guesses.refused():
+                self._note(f"{INITIAL_POSE_TRIES} clouds were refused at the initial pose, which counts no more: {answer.reason}")
         self._on_mapped(MappedCloud(cloud.stamp_ns, cloud.frame, answer, place))
 
     def _sent(
@@ -254,7 +155,7 @@ class Mapper:
                 m = self._link.map()
                 if guess is None:
                     # The same guess each time: with another one the scan would be another one.
-                    guess = self._guess(m, cloud, place)
+                    guess = self.guesses.of(m, cloud, place)
                 answer = m.insert(points, **arguments, **guess)
             except mrol.MrolError as error:
                 self.state.server_error = str(error)
@@ -289,56 +190,12 @@ class Mapper:
             self.state.server_error = ""
         elif isinstance(error, mrol.NotFound):
             self._link.forget_map()
-            self.forget()
+            self.guesses.forget()
         self._note_once(error.reason, f"the server does not take a cloud: {error}")
 
     def _pause(self, error: mrol.MrolError) -> None:
         wished = error.retry_after_s if isinstance(error, mrol.ServerError) else None
         self._closing.wait(min(max(wished or 0.0, PAUSE_S), RETRY_AFTER_MAX_S))
-
-    def _guess(self, m: mrol.Map, cloud: StampedCloud, place: SensorPlace) -> dict[str, Any]:
-        """Where the cloud may have been taken, as arguments of `insert`."""
-        with self._lock:
-            initial, last, has_accepted = self._initial, self._last_odom_from_sensor, self._has_accepted
-            map_from_odom = self._map_from_odom
-        now = place.odom_from_sensor
-        # A robot that the server knows may have been started again far from where it began.
-        if initial is not None and not (initial is self._beginning and self._robot in m.describe().robots):
-            return self._initial_guess(initial, place)
-        if last is not None and now is not None:
-            return {"motion": last.inverse() @ now}
-        if map_from_odom is not None and now is not None:
-            # The last accepted cloud had no odometry, and one before it had.
-            return {"guess": map_from_odom @ now}
-        if has_accepted:
-            return {"constant_velocity": True}
-        down = self._down(cloud)
-        told: dict[str, Any] = {} if down is None else {"gravity_in_sensor": down}
-        if m.describe().scans == 0:
-            # The map lies as the odometry's frame, or as the robot that stands level.
-            first = now if now is not None and np.abs(now.translation_m).max() < FIRST_DISTANCE_MAX_M else place.base_from_sensor
-            return told if first is None else told | {"guess": first}
-        return told
-
-    def _initial_guess(self, initial: InitialPose, place: SensorPlace) -> dict[str, Any]:
-        base_from_sensor = place.base_from_sensor or Pose.identity()
-        map_from_base = initial.map_from_base
-        then = self._odometry.odom_from_base(initial.stamp_ns) if initial.stamp_ns else None
-        if then is not None and place.odom_from_sensor is not None:
-            # It has moved since.
-            map_from_base = map_from_base @ then.inverse() @ place.odom_from_sensor @ base_from_sensor.inverse()
-        guess = map_from_base @ base_from_sensor
-        if initial.covariance is None:
-            return {"guess": guess}
-        lever_m = guess.translation_m - map_from_base.translation_m
-        return {"guess": guess, "guess_covariance": moved_covariance(initial.covariance, lever_m)}
-
-    def _down(self, cloud: StampedCloud) -> NDArray[np.float64] | None:
-        """What is down in the sensor's frame, by the accelerometer."""
-        if not self.imu_frame:
-            return None
-        sensor_from_imu = self._odometry.sensor_from(cloud.frame, self.imu_frame, cloud.stamp_ns)
-        return None if sensor_from_imu is None else self.gravity.at(cloud.stamp_ns, sensor_from_imu)
 
     def localize(self) -> tuple[bool, str]:
         """Searches the map for where the last cloud was taken; if it is found, the next cloud is guessed from there.
@@ -354,7 +211,7 @@ class Mapper:
             found = (
                 self._link.map()
                 .with_timeout(max(self._options.request_timeout_s, 30.0))
-                .localize(points, gravity_in_sensor=self._down(cloud))
+                .localize(points, gravity_in_sensor=self.guesses.down(cloud))
             )
         except (CloudError, mrol.MrolError) as error:
             return False, str(error)
@@ -362,7 +219,7 @@ class Mapper:
             return False, f"{found.verdict}: {found.reason}"
         base_from_sensor = place.base_from_sensor or Pose.identity()
         map_from_base = found.map_from_sensor @ base_from_sensor.inverse()
-        self.set_initial_pose(InitialPose(map_from_base, None, cloud.stamp_ns))
+        self.guesses.begin_at(InitialPose(map_from_base, None, cloud.stamp_ns))
         x, y, z = map_from_base.translation_m
         return True, f"the robot was at {x:.3f} {y:.3f} {z:.3f} m in the map"
 
@@ -382,44 +239,12 @@ class Mapper:
         self.state.times = f"{read.times_field}:{self._rule.unit}:{self._rule.origin}"
         return read.points, seconds
 
-    def _is_later(self, stamp_ns: int) -> bool:
-        """Whether a stamp is later than the last one, or of a clock that was set back."""
-        if stamp_ns <= 0:
-            self._note_once("stamp", f"a cloud with the stamp {stamp_ns} ns is left out: the driver has to stamp its clouds")
-            return False
-        last_ns = self._last_stamp_ns
-        if last_ns is not None and stamp_ns <= last_ns:
-            if last_ns - stamp_ns < SET_BACK_NS:
-                return False
-            self._note_once(
-                "clock", f"the stamps of clouds went back by {(last_ns - stamp_ns) * 1e-9:.1f} s, as of a clock that was set"
-            )
-            with self._lock:
-                self._last_odom_from_sensor = self._map_from_odom = None
-            if not self._options.session and stamp_ns < REAL_CLOCK_NS:
-                self._session = _own_session()
-        self._last_stamp_ns = stamp_ns
-        return True
-
-    def _session_of(self, stamp_ns: int) -> str:
-        """The session in which a stamp is unique."""
-        if not self._session:
-            self._session = "ros2" if stamp_ns >= REAL_CLOCK_NS else _own_session()
-        return self._session
-
     def _note_once(self, kind: str, text: str) -> None:
         if kind not in self._noted:
             self._noted.add(kind)
             self._note(text)
 
 
-def _own_session() -> str:
-    return f"ros2-{uuid.uuid4().hex[:12]}"
-
-
 def _is_passing(error: mrol.ServerError) -> bool:
     """Whether the same request may succeed later."""
     return isinstance(error, mrol.Unavailable | mrol.ResourceExhausted | mrol.DeadlineExceeded | mrol.Internal)
-
-
-__all__ = ["Counts", "InitialPose", "MappedCloud", "Mapper", "MapperState", "StampedCloud"]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from .clouds import CloudField, CloudLayout
+from .clouds import CloudField, CloudLayout, StampedCloud
 from .frames import plain_frame
-from .mapper import InitialPose, StampedCloud
+from .guesses import InitialPose
 from .occupancy_grid import grid_cells
 
 SECOND_NS = 1_000_000_000

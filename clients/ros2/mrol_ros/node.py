@@ -202,8 +202,8 @@ class MrolNode(Node):
         # The first number of this covariance is -1 where there is no accelerometer.
         if message.linear_acceleration_covariance[0] != -1:
             a = message.linear_acceleration
-            self._mapper.imu_frame = plain_frame(message.header.frame_id)
-            self._mapper.gravity.note(stamp_ns_of(message.header.stamp), (a.x, a.y, a.z))
+            self._mapper.guesses.imu_frame = plain_frame(message.header.frame_id)
+            self._mapper.guesses.gravity.note(stamp_ns_of(message.header.stamp), (a.x, a.y, a.z))
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         frame = plain_frame(message.header.frame_id)
@@ -211,7 +211,7 @@ class MrolNode(Node):
             self._warn(f"initialpose must be in frame {self.options.map_frame!r}, got {frame!r}: it is left out")
             return
         try:
-            self._mapper.set_initial_pose(initial_pose_of(message))
+            self._mapper.guesses.begin_at(initial_pose_of(message))
         except ValueError as error:
             self._warn(f"initialpose is left out: {error}")
 
@@ -302,7 +302,7 @@ class MrolNode(Node):
             return response
         try:
             self._link.reset()
-            self._mapper.forget()
+            self._mapper.guesses.forget()
             response.success, response.message = True, f"the map {self.options.map!r} is empty"
         except mrol.MrolError as error:
             response.success, response.message = False, str(error)

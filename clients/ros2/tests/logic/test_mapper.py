@@ -8,8 +8,9 @@ import pytest
 from mrol import Pose
 
 from mrol_ros import mapper as mapper_module
-from mrol_ros.clouds import CloudField, CloudLayout
-from mrol_ros.mapper import INITIAL_POSE_TRIES, InitialPose, Mapper, StampedCloud
+from mrol_ros.clouds import CloudField, CloudLayout, StampedCloud
+from mrol_ros.guesses import INITIAL_POSE_TRIES, InitialPose
+from mrol_ros.mapper import Mapper
 from mrol_ros.odometry import Odometry
 from mrol_ros.options import Options
 
@@ -167,7 +168,7 @@ def test_a_robot_without_a_pose_is_told_what_to_do():
     robot.step(0, 1)
     assert robot.mapper.state.needs_pose
     assert sum("initialpose" in of for of in robot.notes) == 1
-    robot.mapper.set_initial_pose(InitialPose(pose(5, 5), None, BEGIN_NS + STEP_NS))
+    robot.mapper.guesses.begin_at(InitialPose(pose(5, 5), None, BEGIN_NS + STEP_NS))
     guess = robot.step(3)[-1]["guess"]
     # It drove 0.2 m since, and its lidar is 1 m ahead.
     assert guess.translation_m.round(9).tolist() == [6.2, 5, 0]
@@ -191,7 +192,7 @@ def test_an_initial_pose_counts_until_a_cloud_is_accepted_or_many_are_refused():
     assert "guess" not in known.step(0)[0]
     robot = Robot(*["low_overlap"] * (INITIAL_POSE_TRIES + 1))
     covariance = np.diag([0.25, 0.25, 0, 0, 0, 0.07])
-    robot.mapper.set_initial_pose(InitialPose(pose(2), covariance))
+    robot.mapper.guesses.begin_at(InitialPose(pose(2), covariance))
     requests = robot.step(*range(INITIAL_POSE_TRIES + 1))
     assert [("guess_covariance" in of) for of in requests] == [True] * INITIAL_POSE_TRIES + [False]
     assert requests[0]["guess_covariance"][0, 0] == pytest.approx(0.25)
@@ -199,7 +200,7 @@ def test_an_initial_pose_counts_until_a_cloud_is_accepted_or_many_are_refused():
     assert requests[0]["guess_covariance"][1, 1] == pytest.approx(0.32)
     assert any("counts no more" in of for of in robot.notes)
     with pytest.raises(ValueError, match="covariance"):
-        robot.mapper.set_initial_pose(InitialPose(pose(0), np.full((6, 6), np.nan)))
+        robot.mapper.guesses.begin_at(InitialPose(pose(0), np.full((6, 6), np.nan)))
 
 
 def test_without_odometry_it_is_constant_velocity_and_said_once():
