@@ -1,4 +1,4 @@
-"""Which module knows what, and what the launch files set."""
+"""Which module knows what, and what the file of parameters sets."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ import pytest
 from mrol_ros.options import Options
 
 PACKAGE = Path(__file__).resolve().parents[2]
-KNOW_ROS = {"messages.py", "node.py"}
+KNOW_ROS = {"callbacks.py", "messages.py", "node.py"}
 
 
 def imported(tree):
@@ -24,11 +24,11 @@ def imported(tree):
 
 
 @pytest.mark.parametrize("file", sorted((PACKAGE / "mrol_ros").glob("*.py")), ids=lambda file: file.name)
-def test_two_modules_alone_know_ros(file):
+def test_three_modules_alone_know_ros(file):
     names = set(imported(ast.parse(file.read_text())))
     if file.name not in KNOW_ROS:
         assert {name for name in names if not name.startswith(".")} <= set(sys.stdlib_module_names) | {"numpy", "mrol"}
-        assert not names & {".node", ".messages"}
+        assert not names & {".callbacks", ".node", ".messages"}
 
 
 def test_files_of_parameters_name_parameters_that_there_are():
@@ -39,21 +39,3 @@ def test_files_of_parameters_name_parameters_that_there_are():
         default = getattr(Options, name)
         written = {"true": True, "false": False}.get(value, value)
         assert str(default) == str(written), name
-
-
-@pytest.mark.parametrize("file", sorted((PACKAGE / "launch").glob("*.py")), ids=lambda file: file.name)
-def test_launch_files_name_parameters_that_there_are(file):
-    text = file.read_text()
-    compile(text, str(file), "exec")
-    known = {*Options.__dataclass_fields__, "use_sim_time"}
-    own = re.search(r"own = \{name: ParameterValue\(.*? for name in \(([^)]*)\)\}", text)
-    named = re.findall(r'"(\w+)"', own.group(1))
-    assert named[:2] == ["server", "map"]
-    # The others would need another type.
-    assert all(isinstance(getattr(Options, name), str) for name in named)
-    for of in re.findall(r"\*\*own, ([^*}]*)", text):
-        assert set(re.findall(r'"(\w+)":', of)) <= known
-    if "FOR_NAV2" in text:
-        of_nav2 = re.search(r"FOR_NAV2 = \{(.*?)\n\}", text, re.DOTALL)
-        assert set(re.findall(r'"(\w+)":', of_nav2.group(1))) <= known
-    assert '("cloud_in", given["cloud"])' in text
