@@ -12,13 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .texts import shown
+
 TIME_FIELDS = ("t", "time", "timestamp", "offset_time", "time_stamp", "time_offset", "point_time")
 """Fields in which drivers write when a point was measured."""
 
 POINTS_MAX = 2_000_000
 """Points of a cloud, at most: as many as a server takes of a scan by default."""
 
+POINT_STEP_MAX = 1 << 20
+"""Bytes of a point, at most."""
+
 FIELDS_LISTED = 12
+NAME_SHOWN = 40
 
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8", 9: "i8", 10: "u8", 11: "u1"}
 """Types by the numbers of `sensor_msgs/PointField`: 9 to 11, which some distributions add, are int64, uint64 and boolean."""
@@ -87,8 +93,10 @@ def read_cloud(layout: CloudLayout, data: Any, time_field: str | None = None) ->
     Times are those of `time_field`, or of the first of `TIME_FIELDS` that there is.
 
     Raises `CloudError`: x, y, z or `time_field` is missing, a field does not lie within its point, points not within the data, rows
-    overlap, or there are more than `POINTS_MAX` points.
+    overlap, or there are more than `POINTS_MAX` points or than `POINT_STEP_MAX` bytes of each.
     """
+    if layout.point_step > POINT_STEP_MAX:
+        raise CloudError(f"point_step must be at most {POINT_STEP_MAX} bytes, got {layout.point_step}")
     buffer = memoryview(data).cast("B")
     columns = {of.name: of for of in reversed(layout.fields)}
     if time_field is None:
@@ -116,8 +124,8 @@ def read_cloud(layout: CloudLayout, data: Any, time_field: str | None = None) ->
 def _column(layout: CloudLayout, columns: dict[str, CloudField], name: str) -> tuple[str, int]:
     of = columns.get(name)
     if of is None:
-        names = [column.name[:40] for column in layout.fields]
-        listed = " ".join(names[:FIELDS_LISTED]) + (" ..." if len(names) > FIELDS_LISTED else "")
+        names = [shown(column.name, NAME_SHOWN) for column in layout.fields[:FIELDS_LISTED]]
+        listed = " ".join(names) + (" ..." if len(layout.fields) > FIELDS_LISTED else "")
         raise CloudError(f"the cloud has no field {name!r}; it has {listed or 'none'}")
     form = TYPES.get(of.datatype)
     if form is None:

@@ -9,8 +9,14 @@ import numpy as np
 from mrol import Pose
 from numpy.typing import NDArray
 
+AHEAD_MAX_NS = 1_000_000_000
+"""A cloud's stamp counts up to so far ahead of the clock, nanoseconds."""
+
 OPEN_VARIANCE = 1e6
 """The variance of a direction that the map leaves open, m^2 or rad^2."""
+
+ROUNDING = 1e-6
+"""How far correlations may be from what they can be."""
 
 LEAST_STD = np.array([0.5, 0.5, 0.5, 0.1, 0.1, 0.26])
 """For directions of a pose whose variance is 0, which means "not told": m along x y z, then rad. RViz tells x, y and yaw alone."""
@@ -36,11 +42,21 @@ class Correction:
         self._lock = Lock()
         self._map_from_odom: Pose | None = None
         self._stamp_ns: int | None = None
+        self.ahead_ns = 0
+        """How far the last cloud's stamp is ahead of the clock; 0 where it is not, or by less than a second."""
 
-    def update(self, stamp_ns: int, map_from_sensor: Pose, odom_from_sensor: Pose) -> StampedCorrection:
-        """Takes the pose that the server found for the cloud of a stamp, and where odometry has the sensor at that time."""
+    def update(self, stamp_ns: int, map_from_sensor: Pose, odom_from_sensor: Pose, now_ns: int = 0) -> StampedCorrection:
+        """Takes the pose that the server found for the cloud of a stamp, and where odometry has the sensor at that time.
+
+        `now_ns` is the time by the clock, and 0 where nobody tells it.
+        """
         with self._lock:
             self._map_from_odom = map_from_sensor @ odom_from_sensor.inverse()
+            ahead_ns = stamp_ns - now_ns
+            self.ahead_ns = ahead_ns if now_ns > 0 and ahead_ns > AHEAD_MAX_NS else 0
+            if self.ahead_ns:
+                # A stamp of next year would hold for a year, since stamps never go back.
+                stamp_ns = now_ns + AHEAD_MAX_NS
             return self._next(stamp_ns + self._tolerance_ns)
 
     def keep_alive(self, now_ns: int, period_ns: int) -> StampedCorrection | None:
@@ -100,4 +116,8 @@ def guess_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     told[is_open, :] = 0
     told[:, is_open] = 0
     told[np.diag_indices(6)] = np.where(is_open, LEAST_STD**2, variances)
+    scale = np.sqrt(np.diag(told))
+    correlation = told / np.outer(scale, scale)
+    if np.abs(correlation - correlation.T).max() > ROUNDING or np.linalg.eigvalsh(correlation)[0] < -ROUNDING:
+        raise ValueError("the covariance of an initial pose must be symmetric, with correlations that can be")
     return told

@@ -7,6 +7,9 @@ from dataclasses import asdict
 
 from .map_feed import MapFeed
 from .mapper import Mapper
+from .odometry import Odometry
+from .own_scans import OwnScans
+from .texts import shown
 
 Status = tuple[str, str, str, Mapping[str, object]]
 """Name, level (ok, warn, error), sentence, values."""
@@ -15,14 +18,20 @@ Status = tuple[str, str, str, Mapping[str, object]]
 class Diagnosis:
     """Sentences of the node's state; those of clouds count since the last time that they were asked for."""
 
-    def __init__(self, mapper: Mapper, feed: MapFeed) -> None:
+    def __init__(self, mapper: Mapper, feed: MapFeed, odometry: Odometry, own_scans: OwnScans) -> None:
         self._mapper = mapper
         self._feed = feed
+        self._odometry = odometry
+        self._own_scans = own_scans
         self._before = self._numbers()
 
     def statuses(self, publishers: int) -> list[Status]:
         """All statuses; `publishers` is how many publish clouds."""
-        return [self._of_clouds(publishers), self._of_server(), self._of_frames(), self._of_map()]
+        told = [self._of_clouds(publishers), self._of_server(), self._of_frames(), self._of_map()]
+        return [
+            (name, level, shown(text), {key: shown(str(value)) for key, value in values.items()})
+            for name, level, text, values in told
+        ]
 
     def _numbers(self) -> dict[str, int]:
         queue = self._mapper.queue
@@ -48,10 +57,19 @@ class Diagnosis:
             text = "no cloud came: the publisher's QoS may not match (clouds_reliable), or the network drops large ones"
         elif state.needs_pose:
             level, text = "error", "the server does not know where the robot is: publish initialpose, or call localize"
+        elif stranger := self._own_scans.stranger():
+            level, text = "error", stranger
         elif since["refused"] > since["accepted"]:
             level, text = "warn", f"clouds do not fit: {state.reason}"
         elif since["unreadable"]:
-            level, text = "error", "clouds cannot be read: the log says why"
+            level, text = "error", f"clouds cannot be read: {state.left_out}"
+        elif since["failed"]:
+            level, text = "error", state.left_out
+        elif since["late"] > since["accepted"]:
+            level = "warn"
+            text = f"{since['late']} of {since['received']} clouds were left out: their stamps are not later than the one before"
+        elif since["not_sent"] > since["accepted"]:
+            level, text = "error", f"the server does not take clouds: {state.left_out}"
         elif since["dropped"] > since["accepted"]:
             level, text = "warn", f"{since['dropped']} of {since['received']} clouds were dropped for newer ones"
         else:
@@ -66,8 +84,11 @@ class Diagnosis:
 
     def _of_frames(self) -> Status:
         missing = self._mapper.state.missing
-        if self._mapper.last_cloud is None:
+        last = self._mapper.last_cloud
+        if last is None:
             missing = "no cloud says yet which frames are needed"
+        elif not missing:
+            missing = "; ".join(self._odometry.contradictions(last.frame))
         return "frames", "warn" if missing else "ok", missing or "odometry is known", {}
 
     def _of_map(self) -> Status:

@@ -11,6 +11,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from mrol import Pose
 
 from .motion import extrapolate, share_of_motion
@@ -24,6 +25,15 @@ LATE_MAX_NS = 1_000_000_000
 GAP_MAX_NS = 2_000_000_000
 KEPT_NS = 10_000_000_000
 POSES_MAX = 10_000
+"""Poses of a frame that are kept, at most."""
+
+TREE_POSES_MAX = 200_000
+"""Poses of all frames together that are kept, at most: each frame that moves has its share."""
+
+SAME_M = 1e-3
+SAME_DEG = 0.1
+"""Two poses of a frame as close as this are told as the same."""
+
 FRAMES_MAX = 1000
 DEPTH_MAX = 64
 NAME_BYTES_MAX = 256
@@ -52,8 +62,8 @@ class Track:
     poses: list[tuple[float, ...]] = field(default_factory=list)
     """x y z qx qy qz qw."""
 
-    def insert(self, stamp_ns: int, seven: tuple[float, ...]) -> None:
-        """Adds a pose; one of the same stamp is replaced.
+    def insert(self, stamp_ns: int, seven: tuple[float, ...], most: int = POSES_MAX) -> None:
+        """Adds a pose; one of the same stamp is replaced. The newest `most` are kept.
 
         Poses more than ten seconds older than the newest are dropped. A new pose that old is of a clock that was set back:
         all poses before it are dropped.
@@ -67,8 +77,12 @@ class Track:
             return
         self.stamps_ns.insert(at, stamp_ns)
         self.poses.insert(at, seven)
+        self.cut(most)
+
+    def cut(self, most: int) -> None:
+        """Drops poses that are older than ten seconds, and all but the newest `most`."""
         old = bisect_left(self.stamps_ns, self.stamps_ns[-1] - KEPT_NS)
-        old = max(old, len(self.stamps_ns) - POSES_MAX)
+        old = max(old, len(self.stamps_ns) - most)
         if old > 0:
             del self.stamps_ns[:old]
             del self.poses[:old]
@@ -110,6 +124,7 @@ class _Link:
     parent: str
     fixed: Pose | None = None
     track: Track = field(default_factory=Track)
+    contradiction: str = ""
 
 
 class FrameTree:
@@ -117,6 +132,7 @@ class FrameTree:
 
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}
+        self._poses_max = POSES_MAX
 
     def fix(self, parent: str, child: str, seven: Sequence[float]) -> None:
         """Notes where `child` always is in `parent`: x y z qx qy qz qw of `parent_from_child`.
@@ -124,7 +140,19 @@ class FrameTree:
         Raises `BadTransform`.
         """
         pose = Pose.of(checked_transform(parent, child, seven))
-        self._link(parent, child).fixed = pose
+        link = self._link(parent, child)
+        if link.fixed is not None:
+            off = link.fixed.inverse() @ pose
+            off_m, off_deg = float(np.linalg.norm(off.translation_m)), _degrees(off)
+            if off_m > SAME_M or off_deg > SAME_DEG:
+                link.contradiction = (
+                    f"frame {child!r} is fixed in {parent!r} at two poses, {off_m:.3f} m and {off_deg:.1f} degrees apart, and the "
+                    "last one counts: is one of two publishers wrong?"
+                )
+        elif link.track.stamps_ns:
+            link.contradiction = _fixed_and_moving(parent, child)
+            link.track = Track()
+        link.fixed = pose
 
     def note(self, parent: str, child: str, stamp_ns: int, seven: Sequence[float]) -> None:
         """Notes where `child` was in `parent` at a time. A frame that is fixed stays so.
@@ -132,12 +160,31 @@ class FrameTree:
         Raises `BadTransform`.
         """
         checked = checked_transform(parent, child, seven)
-        self._link(parent, child).track.insert(stamp_ns, checked)
+        link = self._link(parent, child)
+        if link.fixed is not None:
+            link.contradiction = _fixed_and_moving(parent, child)
+            return
+        is_first = not link.track.stamps_ns
+        link.track.insert(stamp_ns, checked, self._poses_max)
+        if is_first:
+            tracks = [of.track for of in self._links.values() if of.track.stamps_ns]
+            self._poses_max = min(POSES_MAX, TREE_POSES_MAX // len(tracks))
+            for track in tracks:
+                track.cut(self._poses_max)
 
     def forget_motions(self) -> None:
         """Forgets where frames were that move; those that are fixed stay."""
         for link in self._links.values():
             link.track = Track()
+
+    def poses(self) -> int:
+        """How many poses are kept."""
+        return sum(len(link.track.stamps_ns) for link in self._links.values())
+
+    def contradictions(self, frame: str) -> list[str]:
+        """What publishers say against each other of a frame and those above it, a sentence each."""
+        links = [self._links[of] for of in self.ancestors(frame) if of in self._links]
+        return [link.contradiction for link in links if link.contradiction]
 
     def has(self, frame: str) -> bool:
         """Whether a frame is a child or a parent."""
@@ -210,7 +257,11 @@ class FrameTree:
             raise BadTransform(f"frame {child!r} is left out: {DEPTH_MAX} frames are above it, which is the limit")
         if link is None and len(self._links) >= FRAMES_MAX:
             raise BadTransform(f"frame {child!r} is left out: there are {FRAMES_MAX} frames, which is the limit")
-        link = self._links[child] = _Link(parent)
+        told = ""
+        if link is not None:
+            one, other = sorted((link.parent, parent))
+            told = f"frame {child!r} hangs on {one!r} and on {other!r}: two publishers tell of it, and the last one counts"
+        link = self._links[child] = _Link(parent, contradiction=told)
         return link
 
 
@@ -238,6 +289,15 @@ def checked_transform(parent: str, child: str, seven: Sequence[float]) -> tuple[
     if not (all(map(math.isfinite, (x, y, z))) and 0.5 <= length <= 2.0):
         raise BadTransform(f"the transform from {child!r} to {parent!r} has numbers that are no pose")
     return x, y, z, qx / length, qy / length, qz / length, qw / length
+
+
+def _degrees(turn: Pose) -> float:
+    vector, scalar = turn.rotation_xyzw[:3], float(turn.rotation_xyzw[3])
+    return math.degrees(2 * math.atan2(float(np.linalg.norm(vector)), abs(scalar)))
+
+
+def _fixed_and_moving(parent: str, child: str) -> str:
+    return f"frame {child!r} is told by /tf and by /tf_static in {parent!r}: it counts as fixed"
 
 
 def _other_time(off_ns: int, side: str, beyond_ns: int) -> NoTransform:

@@ -31,7 +31,7 @@ class InitialPose:
     map_from_base: Pose
     covariance: NDArray[np.float64] | None = None
     stamp_ns: int = 0
-    """When that was so; 0: now."""
+    """When that was so, by the robot's clock; 0: now."""
 
 
 class Guesses:
@@ -118,8 +118,9 @@ class Guesses:
         """What is down in the sensor's frame, by the accelerometer."""
         if not self.imu_frame:
             return None
-        sensor_from_imu = self._odometry.sensor_from(cloud.frame, self.imu_frame, cloud.stamp_ns)
-        return None if sensor_from_imu is None else self.gravity.at(cloud.stamp_ns, sensor_from_imu)
+        time_ns = self._odometry.time_of(cloud.stamp_ns)
+        sensor_from_imu = self._odometry.sensor_from(cloud.frame, self.imu_frame, time_ns)
+        return None if sensor_from_imu is None else self.gravity.at(time_ns, sensor_from_imu)
 
     def _of_initial(self, initial: InitialPose, place: SensorPlace) -> dict[str, Any]:
         base_from_sensor = place.base_from_sensor or Pose.identity()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 
 from .octree import FREE, OCCUPIED, Leaves, octree_data
 from .options import Options
+from .own_scans import OwnScans
 from .server_link import ServerLink
+from .texts import shown
 from .voxel_set import VoxelSet
 
 PAUSE_S = 1.0
@@ -59,7 +62,10 @@ class MapFeed:
         on_grid: Callable[[Grid], None],
         on_voxels: Callable[[MapVoxels], None],
         wants_voxels: Callable[[], bool],
+        *,
+        own_scans: OwnScans,
     ) -> None:
+        """`own_scans` is told of each scan that comes into the map."""
         self.error = ""
         """Why the map is not followed; empty while it is."""
         self.outside = 0
@@ -68,6 +74,7 @@ class MapFeed:
         self.grid_revision: int | None = None
         self._options = options
         self._link = link
+        self._own_scans = own_scans
         self._on_grid = on_grid
         self._on_voxels = on_voxels
         self._wants_voxels = wants_voxels
@@ -105,12 +112,17 @@ class MapFeed:
                         self.error = ""
                         if isinstance(event, mrol.WatchedState | mrol.WatchedChange):
                             self._set.take(event)
+                        if isinstance(event, mrol.WatchedChange) and isinstance(event.cause, mrol.WatchedScan):
+                            self._own_scans.see(event.cause)
                         if self._closing.is_set():
                             return
             except mrol.MrolError as error:
-                self.error = str(error)
+                self.error = shown(str(error))
                 if isinstance(error, mrol.NotFound):
                     self._link.forget_map()
+            except Exception as error:
+                # A defect at one event ends nothing: the map is followed anew.
+                self.error = shown(f"the node failed at an event: {error!r}")
             self._closing.wait(PAUSE_S)
 
     def _tell(self) -> None:
@@ -134,7 +146,9 @@ class MapFeed:
                     self.voxels = self.read_voxels()
                     self._on_voxels(self.voxels)
             except mrol.MrolError as error:
-                self.error = str(error)
+                self.error = shown(str(error))
+            except Exception as error:
+                self.error = shown(f"the node failed at a map: {error!r}")
 
     def _tell_grid(self) -> None:
         # What has changed while it is drawn is drawn again.
@@ -169,7 +183,7 @@ class MapFeed:
     def _free(self, occupied: NDArray[np.int32], free_level: int) -> NDArray[np.int32]:
         """The free voxels of a coarser level around the occupied ones."""
         low, high = (occupied.min(axis=0) >> free_level), (occupied.max(axis=0) >> free_level) + 1
-        if int(np.prod((high - low).astype(np.int64))) > CLASSIFIED_MAX:
+        if math.prod((high - low).tolist()) > CLASSIFIED_MAX:
             raise mrol.MrolError(f"octomap_free_level must be coarser: the map has more than {CLASSIFIED_MAX} voxels of that level")
         axes = [np.arange(begin, end, dtype=np.int32) for begin, end in zip(low, high, strict=True)]
         indices = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
@@ -19,14 +20,28 @@ from .mapper_state import MapperState
 from .newest import NewestQueue
 from .odometry import Odometry, SensorPlace
 from .options import Options
+from .own_scans import OwnScans
 from .point_times import NoTimes, TimesRule, find_rule, times_s
 from .server_link import ServerLink
 from .stamps import CloudStamps
+from .texts import shown
 
 PAUSE_S = 0.3
 """How long nothing is sent after the server was not reached."""
 
 RETRY_AFTER_MAX_S = 5.0
+
+NOTED_MAX = 50
+"""Kinds of oddities that are noted, at most: a server may give any number of reasons."""
+
+TRACE_MAX = 2000
+"""Characters of a defect's traceback that are logged, the last ones."""
+
+KIND_MAX = 64
+"""Characters of a kind that count."""
+
+GUESS_REASONS = ("bad_pose", "bad_covariance", "scan_out_of_range")
+"""Reasons of the server for which the guess is to blame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +71,16 @@ class Mapper:
         *,
         robot: str = "",
         is_simulated: bool = False,
+        own_scans: OwnScans | None = None,
     ) -> None:
         """`note` is told what a person should know, each kind of it once; `on_mapped` of each answer.
 
-        `robot` is its name on the server.
+        `robot` is its name on the server; `own_scans` is told of each scan that is sent.
         """
         self.queue: NewestQueue[StampedCloud] = NewestQueue()
         self.state = MapperState()
         self.guesses = Guesses(options, odometry, robot)
+        self.own_scans = own_scans or OwnScans(robot)
         self.is_paused = False
         self._options = options
         self._link = link
@@ -82,8 +99,15 @@ class Mapper:
         """Sends clouds until it is closed."""
         while not self._closing.is_set():
             cloud = self.queue.take(0.5)
-            if cloud is not None:
+            if cloud is None:
+                continue
+            try:
                 self.step(cloud)
+            except Exception as error:
+                # A defect at one cloud ends no mapping.
+                self.state.counts.failed += 1
+                self.state.left_out = shown(f"the node failed at a cloud: {error!r}")
+                self._note_once("defect", f"{self.state.left_out}; please report this:\n{traceback.format_exc()[-TRACE_MAX:]}")
 
     def close(self) -> None:
         """Ends `run` after the request that is under way."""
@@ -97,8 +121,7 @@ class Mapper:
             counts.paused += 1
             return
         if not is_frame_name(cloud.frame):
-            counts.unreadable += 1
-            self._note_once("frame", f"a cloud is left out: its header must name a frame, got {cloud.frame[:40]!r}")
+            self._unreadable("frame", f"its header must name a frame, got {cloud.frame[:40]!r}")
             return
         verdict = self._stamps.judge(cloud.stamp_ns)
         if verdict.oddity:
@@ -117,8 +140,7 @@ class Mapper:
         try:
             points, seconds = self._points(cloud)
         except CloudError as error:
-            counts.unreadable += 1
-            self._note_once("cloud", f"a cloud is left out: {error}")
+            self._unreadable("cloud", str(error))
             return
         arguments: dict[str, Any] = {
             "scan_id": cloud.stamp_ns,
@@ -133,17 +155,25 @@ class Mapper:
         if answer is not None:
             self._take(cloud, place, answer)
 
+    def _unreadable(self, kind: str, why: str) -> None:
+        self.state.counts.unreadable += 1
+        self.state.left_out = shown(why)
+        self._note_once(kind, f"a cloud is left out: {why}")
+
     def _take(self, cloud: StampedCloud, place: SensorPlace, answer: ScanAnswer) -> None:
         state = self.state
-        state.verdict, state.reason, state.needs_pose = answer.verdict, answer.reason, False
+        state.verdict, state.reason, state.needs_pose = shown(answer.verdict), shown(answer.reason), False
         if answer.accepted:
             state.counts.accepted += 1
             self.guesses.accepted(answer.map_from_sensor, place)
         else:
             state.counts.refused += 1
-            if self.guesses.refused():
-                self._note(f"{INITIAL_POSE_TRIES} clouds were refused at the initial pose, which counts no more: {answer.reason}")
+            self._refused_at_guess(state.reason)
         self._on_mapped(MappedCloud(cloud.stamp_ns, cloud.frame, answer, place))
+
+    def _refused_at_guess(self, reason: str) -> None:
+        if self.guesses.refused():
+            self._note(f"{INITIAL_POSE_TRIES} clouds were refused at the initial pose, which counts no more: {reason}")
 
     def _sent(
         self, points: NDArray[np.float32], arguments: dict[str, Any], cloud: StampedCloud, place: SensorPlace
@@ -156,15 +186,17 @@ class Mapper:
                 if guess is None:
                     # The same guess each time: with another one the scan would be another one.
                     guess = self.guesses.of(m, cloud, place)
+                self.own_scans.sent(arguments["session"], arguments["scan_id"])
                 answer = m.insert(points, **arguments, **guess)
             except mrol.MrolError as error:
-                self.state.server_error = str(error)
+                self.state.server_error = shown(str(error))
                 is_uncertain = is_uncertain or (bool(error.repeat_with) and not isinstance(error, mrol.ConnectFailed))
                 if isinstance(error, mrol.ServerError) and not error.repeat_with and not _is_passing(error):
                     self._refused(error)
                     return None
                 if not is_uncertain:
                     self.state.counts.not_sent += 1
+                    self.state.left_out = self.state.server_error
                     self._pause(error)
                     return None
                 self.state.counts.repeated += 1
@@ -185,13 +217,16 @@ class Mapper:
             )
             return
         counts.not_sent += 1
-        if error.reason in ("scan_id_taken", "scan_withdrawn", "scan_id_too_old"):
+        self.state.left_out = shown(str(error))
+        if error.reason in GUESS_REASONS:
+            self._refused_at_guess(self.state.left_out)
+        elif error.reason in ("scan_id_taken", "scan_withdrawn", "scan_id_too_old"):
             # An earlier run has sent a cloud of this stamp.
             self.state.server_error = ""
         elif isinstance(error, mrol.NotFound):
             self._link.forget_map()
             self.guesses.forget()
-        self._note_once(error.reason, f"the server does not take a cloud: {error}")
+        self._note_once(error.reason[:KIND_MAX], f"the server does not take a cloud: {self.state.left_out}")
 
     def _pause(self, error: mrol.MrolError) -> None:
         wished = error.retry_after_s if isinstance(error, mrol.ServerError) else None
@@ -219,7 +254,7 @@ class Mapper:
             return False, f"{found.verdict}: {found.reason}"
         base_from_sensor = place.base_from_sensor or Pose.identity()
         map_from_base = found.map_from_sensor @ base_from_sensor.inverse()
-        self.guesses.begin_at(InitialPose(map_from_base, None, cloud.stamp_ns))
+        self.guesses.begin_at(InitialPose(map_from_base, None, self._odometry.time_of(cloud.stamp_ns)))
         x, y, z = map_from_base.translation_m
         return True, f"the robot was at {x:.3f} {y:.3f} {z:.3f} m in the map"
 
@@ -240,7 +275,7 @@ class Mapper:
         return read.points, seconds
 
     def _note_once(self, kind: str, text: str) -> None:
-        if kind not in self._noted:
+        if kind not in self._noted and len(self._noted) < NOTED_MAX:
             self._noted.add(kind)
             self._note(text)
 

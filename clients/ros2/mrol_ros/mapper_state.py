@@ -19,6 +19,8 @@ class Counts:
     """Those that the server could not be reached for, or would not take."""
     repeated: int = 0
     """Requests that were sent again since their answer was lost."""
+    failed: int = 0
+    """Those at which the node itself failed: a defect, which the log has."""
     paused: int = 0
     without_odometry: int = 0
     without_times: int = 0
@@ -34,6 +36,8 @@ class MapperState:
     reason: str = ""
     server_error: str = ""
     """Why the last request had no answer; empty while the server answers."""
+    left_out: str = ""
+    """Why the last cloud of those was left out that could not be read, or were not taken."""
     missing: str = ""
     """What is missing for a better guess."""
     needs_pose: bool = False

@@ -22,6 +22,8 @@ from .guesses import InitialPose
 from .occupancy_grid import grid_cells
 
 SECOND_NS = 1_000_000_000
+STAMP_MAX_NS = (1 << 31) * SECOND_NS - 1
+"""The last time that a stamp can tell."""
 
 
 def stamp_ns_of(stamp: Time) -> int:
@@ -30,7 +32,8 @@ def stamp_ns_of(stamp: Time) -> int:
 
 
 def stamp_of(stamp_ns: int) -> Time:
-    """Nanoseconds as a stamp."""
+    """Nanoseconds as a stamp; the nearest one that there is."""
+    stamp_ns = min(max(stamp_ns, 0), STAMP_MAX_NS)
     return Time(sec=stamp_ns // SECOND_NS, nanosec=stamp_ns % SECOND_NS)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
+import traceback
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -19,20 +21,21 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Odometry as OdometryMessage
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 from sensor_msgs.msg import Imu, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
+from .callbacks import beside, spin
 from .correction import Correction, StampedCorrection, covariance_of
 from .diagnosis import Diagnosis
 from .frames import BadTransform, plain_frame
 from .map_feed import MapFeed, MapVoxels
-from .mapper import MappedCloud, Mapper
+from .mapper import TRACE_MAX, MappedCloud, Mapper
 from .messages import (
     centers_message,
     cloud_of,
@@ -48,7 +51,9 @@ from .messages import (
 )
 from .odometry import Odometry
 from .options import DESCRIPTIONS, OptionError, Options
+from .own_scans import OwnScans
 from .server_link import ServerLink
+from .texts import shown
 
 try:
     from octomap_msgs.msg import Octomap
@@ -59,8 +64,16 @@ except ImportError:
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For what a subscriber that comes last has to get, too."""
 
+SELDOM_S = 60.0
+"""A warning of the same kind is not given again before."""
+
+WARNING_MAX = 3000
+"""Characters of a warning."""
+
 CLOSE_MAX_S = 2.0
 """How long callbacks may take to end."""
+
+FRAME_SHOWN = 40
 
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 TF_STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -76,14 +89,25 @@ class MrolNode(Node):
         is_simulated = bool(self.get_parameter("use_sim_time").value)
         self._link = ServerLink(self.options, self.robot)
         self._odometry = Odometry(self.options)
+        self._own_scans = OwnScans(self.robot)
         self._mapper = Mapper(
-            self.options, self._link, self._odometry, self._on_mapped, self._warn, robot=self.robot, is_simulated=is_simulated
+            self.options,
+            self._link,
+            self._odometry,
+            self._on_mapped,
+            self._warn,
+            robot=self.robot,
+            is_simulated=is_simulated,
+            own_scans=self._own_scans,
         )
-        self._feed = MapFeed(self.options, self._link, self._on_grid, self._on_voxels, self._wants_voxels)
-        self._diagnosis = Diagnosis(self._mapper, self._feed)
+        self._feed = MapFeed(
+            self.options, self._link, self._on_grid, self._on_voxels, self._wants_voxels, own_scans=self._own_scans
+        )
+        self._diagnosis = Diagnosis(self._mapper, self._feed, self._odometry, self._own_scans)
         self._correction = Correction(round(self.options.transform_tolerance * 1e9))
         self._period_ns = round(self.options.transform_period_s * 1e9)
         self._last_now_ns = 0
+        self._warned_s: dict[str, float] = {}
         self._make_publishers()
         self._make_subscriptions()
         self._make_services()
@@ -138,28 +162,13 @@ class MrolNode(Node):
             offered.append((GetOctomap, "octomap_binary", self._get_octomap))
         for kind, name, callback in offered:
             # In a group of its own, so that one that takes long holds up itself alone.
-            self.create_service(kind, name, self._beside(callback), callback_group=MutuallyExclusiveCallbackGroup())
+            self.create_service(kind, name, beside(self, callback), callback_group=MutuallyExclusiveCallbackGroup())
 
-    def _beside(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        """A callback of a service that runs in a thread of its own: the one of all topics does not wait for the server."""
-
-        async def answered(request: Any, response: Any) -> Any:
-            done: Future[Any] = Future(executor=self.executor)
-
-            def run() -> None:
-                try:
-                    done.set_result(callback(request, response))
-                except Exception as error:
-                    self.get_logger().error(f"a service failed: {error!r}")
-                    done.set_result(response)
-                executor = self.executor
-                if executor is not None:
-                    executor.wake()
-
-            Thread(target=run, daemon=True).start()
-            return await done
-
-        return answered
+    def callback_failed(self, error: Exception) -> None:
+        """Says that a callback failed: a defect."""
+        trace = "".join(traceback.format_exception(error))
+        text = f"a callback failed: {error!r}; please report this: {trace[-TRACE_MAX:]}"
+        self.get_logger().error(shown(text, WARNING_MAX), throttle_duration_sec=SELDOM_S)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -189,14 +198,14 @@ class MrolNode(Node):
                 stamp_ns = stamp_ns_of(transform.header.stamp)
                 self._odometry.note_transform(parent, child, stamp_ns, seven_of_transform(transform), is_static=is_static)
             except BadTransform as error:
-                self.get_logger().warning(f"a transform is left out: {error}", throttle_duration_sec=60.0)
+                self._warn_seldom("transform", f"a transform is left out: {error}")
 
     def _on_odometry(self, message: OdometryMessage) -> None:
         try:
             seven = seven_of_pose(message.pose.pose)
             self._odometry.note_pose(message.header.frame_id, message.child_frame_id, stamp_ns_of(message.header.stamp), seven)
         except BadTransform as error:
-            self.get_logger().warning(f"odometry is left out: {error}", throttle_duration_sec=60.0)
+            self._warn_seldom("odometry", f"odometry is left out: {error}")
 
     def _on_imu(self, message: Imu) -> None:
         # The first number of this covariance is -1 where there is no accelerometer.
@@ -208,12 +217,15 @@ class MrolNode(Node):
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         frame = plain_frame(message.header.frame_id)
         if frame != self.options.map_frame:
-            self._warn(f"initialpose must be in frame {self.options.map_frame!r}, got {frame!r}: it is left out")
+            got = shown(frame, FRAME_SHOWN)
+            self._warn_seldom(
+                "initialpose", f"initialpose must be in frame {self.options.map_frame!r}, got {got!r}: it is left out"
+            )
             return
         try:
             self._mapper.guesses.begin_at(initial_pose_of(message))
         except ValueError as error:
-            self._warn(f"initialpose is left out: {error}")
+            self._warn_seldom("initialpose", f"initialpose is left out: {error}")
 
     # What goes out.
 
@@ -221,13 +233,21 @@ class MrolNode(Node):
         answer, place = mapped.answer, mapped.place
         if not answer.accepted:
             return
+        time_ns = self._odometry.time_of(mapped.stamp_ns)
         if self.options.publish_tf and place.odom_from_sensor is not None:
-            self._publish_tf(self._correction.update(mapped.stamp_ns, answer.map_from_sensor, place.odom_from_sensor))
+            correction = self._correction
+            self._publish_tf(correction.update(time_ns, answer.map_from_sensor, place.odom_from_sensor, self._now_ns()))
+            if correction.ahead_ns:
+                self._warn_seldom(
+                    "ahead",
+                    f"clouds are stamped {correction.ahead_ns * 1e-9:.1f} s ahead of the clock of this node, and map -> odom is "
+                    "not: set the clocks, or the parameter time_offset_s",
+                )
         if answer.information is None or place.base_from_sensor is None:
             return
         map_from_base = answer.map_from_sensor @ place.base_from_sensor.inverse()
         covariance = covariance_of(answer.information, map_from_base.translation_m - answer.map_from_sensor.translation_m)
-        self._pose.publish(pose_message(mapped.stamp_ns, self.options.map_frame, map_from_base, covariance))
+        self._pose.publish(pose_message(time_ns, self.options.map_frame, map_from_base, covariance))
 
     def _publish_tf(self, correction: StampedCorrection) -> None:
         pose: Pose = correction.map_from_odom
@@ -266,12 +286,21 @@ class MrolNode(Node):
         statuses = self._diagnosis.statuses(self.count_publishers(self._clouds.topic_name))
         named = [(f"{self.get_fully_qualified_name()}: {name}", *of) for name, *of in statuses]
         self._diagnostics.publish(diagnostics_message(self._now_ns(), self.robot, named))
+        if stranger := self._own_scans.stranger():
+            self._warn_seldom("stranger", stranger)
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
     def _warn(self, text: str) -> None:
-        self.get_logger().warning(text)
+        self.get_logger().warning(shown(text, WARNING_MAX))
+
+    def _warn_seldom(self, kind: str, text: str) -> None:
+        """Warns, unless a warning of this kind was given within the last minute."""
+        now_s = time.monotonic()
+        if now_s - self._warned_s.get(kind, -SELDOM_S) >= SELDOM_S:
+            self._warned_s[kind] = now_s
+            self._warn(text)
 
     # Services.
 
@@ -330,11 +359,11 @@ def main() -> None:
         signal.signal(number, lambda *_: ended.set())
     try:
         node = MrolNode()
-    except OptionError as error:
-        sys.exit(f"mrol_ros: {error}")
+    except (OptionError, NameValidationException) as error:
+        sys.exit(f"mrol_ros: {shown(str(error))}")
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    spinning = Thread(target=executor.spin, daemon=True)
+    spinning = Thread(target=spin, args=(executor, node.callback_failed), daemon=True)
     spinning.start()
     ended.wait()
     executor.shutdown(timeout_sec=CLOSE_MAX_S)

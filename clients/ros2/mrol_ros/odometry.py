@@ -45,6 +45,16 @@ class Odometry:
         """The frame in which odometry tells where the robot is."""
         return self._odom
 
+    def time_of(self, stamp_ns: int) -> int:
+        """The time by the robot's clock at which a cloud of a stamp was taken."""
+        return stamp_ns + self._offset_ns
+
+    def contradictions(self, sensor: str) -> list[str]:
+        """What publishers say against each other of the frames that a sensor's place is made of, a sentence each."""
+        with self._changed:
+            own = self._frames.contradictions(sensor)
+            return own + [of for of in self._frames.contradictions(self._moving) if of not in own]
+
     def note_transform(self, parent: str, child: str, stamp_ns: int, seven: Sequence[float], *, is_static: bool) -> None:
         """Takes a transform, x y z qx qy qz qw of `parent_from_child`.
 
@@ -76,7 +86,7 @@ class Odometry:
 
     def place(self, sensor: str, stamp_ns: int, wait_s: float = WAIT_S) -> SensorPlace:
         """Where the sensor was at a cloud's stamp, for which transforms are waited as long as some are likely to come."""
-        stamp_ns += self._offset_ns
+        stamp_ns = self.time_of(stamp_ns)
         begin_s = self._now_s()
         self._began_s = begin_s if self._began_s is None else self._began_s
         with self._changed:
@@ -94,11 +104,11 @@ class Odometry:
             except NoTransform as error:
                 return SensorPlace(None, base_from_sensor, str(error))
 
-    def odom_from_base(self, stamp_ns: int) -> Pose | None:
-        """Where the robot was at a time, by its odometry."""
+    def odom_from_base(self, time_ns: int) -> Pose | None:
+        """Where the robot was at a time by its own clock, by its odometry."""
         with self._changed:
             try:
-                return self._odom_from_moving(self._options.base, stamp_ns + self._offset_ns, EXTRAPOLATION_MAX_NS)
+                return self._odom_from_moving(self._options.base, time_ns, EXTRAPOLATION_MAX_NS)
             except NoTransform:
                 return None
 
@@ -128,11 +138,11 @@ class Odometry:
         except NoTransform:
             return None
 
-    def sensor_from(self, sensor: str, frame: str, stamp_ns: int) -> Pose | None:
-        """Where another frame is on the sensor, such as that of an accelerometer."""
+    def sensor_from(self, sensor: str, frame: str, time_ns: int) -> Pose | None:
+        """Where another frame is on the sensor, such as that of an accelerometer, at a time by the robot's own clock."""
         with self._changed:
             try:
-                return self._frames.transform(sensor, plain_frame(frame), stamp_ns, EXTRAPOLATION_MAX_NS)
+                return self._frames.transform(sensor, plain_frame(frame), time_ns, EXTRAPOLATION_MAX_NS)
             except NoTransform:
                 return None
 

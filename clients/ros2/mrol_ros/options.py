@@ -12,8 +12,9 @@ from typing import Any
 import mrol
 from mrol import Pose
 
-from .frames import plain_frame
+from .frames import NAME_BYTES_MAX, is_frame_name, plain_frame
 from .point_times import TimesRule, parse_times
+from .texts import shown
 
 DESCRIPTIONS = {
     "server": "address of the server's HTTP: host:port, https://host:port or unix:/path",
@@ -53,6 +54,17 @@ DESCRIPTIONS = {
 }
 """What each parameter means, for `ros2 param describe`."""
 
+
+RANGES_S = {
+    "transform_period_s": (0.001, 60.0),
+    "transform_tolerance": (0.0, 3600.0),
+    "request_timeout_s": (0.01, 3600.0),
+    "time_offset_s": (-1e10, 1e10),
+}
+"""The least and the largest value of times, seconds: ROS and sockets have none beyond."""
+
+VALUE_SHOWN = 80
+"""Characters of a wrong value that are shown."""
 
 ROBOT_NAME_MAX = 64
 """Characters of a robot's name on the server."""
@@ -107,9 +119,10 @@ class Options:
             numbers = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
             if any(isinstance(number, float) and not math.isfinite(number) for number in numbers):
                 raise OptionError(f"{of.name} must be finite, got {value}")
-        for name in ("transform_period_s", "request_timeout_s"):
-            _check(getattr(self, name) > 0, name, "above 0", getattr(self, name))
-        for name in ("resolution", "range_min_m", "range_max_m", "transform_tolerance", "grid_period_s", "octomap_period_s"):
+        for name, (least, most) in RANGES_S.items():
+            _check(least <= getattr(self, name) <= most, name, f"{least:g} to {most:g} s", getattr(self, name))
+        self._check_frames()
+        for name in ("resolution", "range_min_m", "range_max_m", "grid_period_s", "octomap_period_s"):
             _check(getattr(self, name) >= 0, name, "0 or more", getattr(self, name))
         _check(
             self.occupancy_min_z < self.occupancy_max_z,
@@ -132,6 +145,13 @@ class Options:
             parse_times(self.times)
         except ValueError as error:
             raise OptionError(str(error)) from error
+
+    def _check_frames(self) -> None:
+        for name, frame in (("frame_id", self.map_frame), ("odom_frame", self.odom), ("base_frame_id", self.base)):
+            _check(is_frame_name(frame), name, f"name a frame in 1 to {NAME_BYTES_MAX} printable bytes", frame, verb="must")
+        is_own = self.publish_tf and self.odom == self.map_frame
+        _check(not is_own, "odom_frame", "another frame than frame_id", self.odom)
+        _check(self.base != self.odom, "base_frame_id", "another frame than odom_frame", self.base)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Options:
@@ -189,6 +209,6 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _check(is_good: bool, name: str, expected: str, value: object) -> None:
+def _check(is_good: bool, name: str, expected: str, value: object, verb: str = "must be") -> None:
     if not is_good:
-        raise OptionError(f"{name} must be {expected}, got {value}")
+        raise OptionError(f"{name} {verb} {expected}, got {shown(str(value), VALUE_SHOWN)}")

@@ -4,12 +4,11 @@ import json
 import math
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
 from array import array
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
@@ -73,64 +72,24 @@ class Server:
             self._process = None
 
 
-class FreezingProxy:
-    """Forwards connections to a server; while it is frozen, no byte gets through, and nobody is told."""
-
-    def __init__(self, server):
-        host, port = server.address.rsplit(":", 1)
-        self._server = (host, int(port))
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
-        self._thawed = Event()
-        self._thawed.set()
-        Thread(target=self._accept, daemon=True).start()
-
-    def freeze(self):
-        """Lets nothing through."""
-        self._thawed.clear()
-
-    def thaw(self):
-        """Lets all through, what waited too."""
-        self._thawed.set()
-
-    def stop(self):
-        """Takes no more connections."""
-        self._thawed.set()
-        self._listener.close()
-
-    def _accept(self):
-        while True:
-            try:
-                client, _ = self._listener.accept()
-                server = socket.create_connection(self._server)
-            except OSError:
-                return
-            for ends in ((client, server), (server, client)):
-                Thread(target=self._carry, args=ends, daemon=True).start()
-
-    def _carry(self, source, sink):
-        with suppress(OSError):
-            while data := source.recv(1 << 16):
-                self._thawed.wait()
-                sink.sendall(data)
-        with suppress(OSError):
-            sink.shutdown(socket.SHUT_WR)
-
-
 class NodeProcess:
     """The node, as `ros2 run mrol_ros node` starts it."""
 
-    def __init__(self, folder, server, *, namespace="/", remaps=(), **parameters):
+    def __init__(self, folder, server=None, *, namespace="/", remaps=(), launched=None, **parameters):
+        if launched is None:
+            arguments = ["-r", f"__ns:={namespace}", "-r", "cloud_in:=points"]
+            for remap in remaps:
+                arguments += ["-r", remap]
+            for name, value in {"server": server.address, "publish_tf": True, **parameters}.items():
+                # JSON is what YAML takes, too.
+                arguments += ["-p", f"{name}:={json.dumps(value)}"]
+        else:
+            # As a launch file describes it.
+            namespace, arguments = f"/{launched.namespace}", launched.arguments
         self.log = folder / f"node{namespace.replace('/', '-')}.log"
-        arguments = ["--ros-args", "-r", f"__ns:={namespace}", "-r", "cloud_in:=points"]
-        for remap in remaps:
-            arguments += ["-r", remap]
-        for name, value in {"server": server.address, "publish_tf": True, **parameters}.items():
-            # JSON is what YAML takes, too.
-            arguments += ["-p", f"{name}:={json.dumps(value)}"]
         with self.log.open("a") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "mrol_ros.node", *arguments], stdout=log, stderr=subprocess.STDOUT, cwd=folder
+                [sys.executable, "-m", "mrol_ros.node", "--ros-args", *arguments], stdout=log, stderr=subprocess.STDOUT, cwd=folder
             )
 
     @property

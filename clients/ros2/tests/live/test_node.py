@@ -2,6 +2,7 @@
 
 import time
 from contextlib import ExitStack
+from itertools import pairwise
 from types import SimpleNamespace
 
 import mrol
@@ -18,7 +19,8 @@ from mrol_ros.clouds import read_cloud
 from mrol_ros.messages import cloud_of
 from mrol_ros.octree import OCCUPIED, octree_cells
 
-from .support import BASE_FROM_LIDAR, FreezingProxy, NodeProcess, Robot, call, running, stamp, take_one, wait_until
+from .proxy import Proxy
+from .support import BASE_FROM_LIDAR, NodeProcess, Robot, call, running, stamp, take_one, wait_until
 
 TOLERANCE_NS = 3_000_000_000
 """So long that the answer to each cloud comes in time, however busy the machine is."""
@@ -212,7 +214,7 @@ def test_nothing_is_lost_or_there_twice_when_server_and_node_are_killed(server, 
 
 
 def test_nothing_is_lost_or_there_twice_when_the_network_is_gone(server, tmp_path):
-    robot, proxy = Robot(), FreezingProxy(server)
+    robot, proxy = Robot(), Proxy(server)
     robot.start()
     node = NodeProcess(tmp_path, proxy, robot="r1", request_timeout_s=1.0, **CLOUDS)
     with running(proxy, robot, node):
@@ -226,6 +228,36 @@ def test_nothing_is_lost_or_there_twice_when_the_network_is_gone(server, tmp_pat
             proxy.thaw()
             count = len(robot.poses)
             wait_until(lambda count=count: len(robot.poses) >= count + 5, 150, "poses after the network is back")
+        assert int(robot.status("clouds")[2]["repeated"]) > 0
+        call(SetBool, "/pause", SetBool.Request(data=True))
+        time.sleep(2)
+        check_scans(robot, server)
+    assert "Traceback" not in node.log.read_text()
+
+
+def test_nothing_is_lost_or_there_twice_when_the_network_loses_all_for_twenty_seconds(server, tmp_path):
+    robot, proxy = Robot(), Proxy(server)
+    robot.start()
+    node = NodeProcess(tmp_path, proxy, robot="r1", request_timeout_s=3.0, **CLOUDS)
+    with running(proxy, robot, node):
+        wait_until(lambda: len(robot.poses) >= 5, 150, "poses")
+        began_ns = time.time_ns()
+        proxy.lose()
+        time.sleep(20)
+        ended_ns = time.time_ns()
+        assert robot.status("server")[0] == 2
+        proxy.find()
+        count = len(robot.poses)
+        wait_until(lambda: len(robot.poses) >= count + 5, 150, "poses after the network is back")
+        # The map's frame was there all the time: each transform goes on where the one before it ends.
+        told = [of for of in list(robot.corrections) if began_ns - 10**9 < of[0] < ended_ns + 10**9]
+        ends = [stamp_ns for _, stamp_ns, _ in told]
+        assert ends == sorted(set(ends))
+        assert ends[0] < began_ns + 2 * 10**9
+        assert ends[-1] > ended_ns - 10**9
+        gaps = [later - sooner for sooner, later in pairwise(ends)]
+        assert len(ends) > 20, ends
+        assert max(gaps) < 2 * 10**9
         assert int(robot.status("clouds")[2]["repeated"]) > 0
         call(SetBool, "/pause", SetBool.Request(data=True))
         time.sleep(2)

@@ -58,7 +58,7 @@ class ScriptedMap:
 class Robot:
     """A mapper with a robot that drives 1 m/s, whose lidar is 1 m ahead of its base."""
 
-    def __init__(self, *script, scans=1, has_odometry=True, options=None, is_simulated=False):
+    def __init__(self, *script, scans=1, has_odometry=True, options=None, is_simulated=False, on_mapped=None):
         self.map = ScriptedMap(*script, scans=scans)
         self.notes, self.mapped, self.forgotten = [], [], 0
         self.link = SimpleNamespace(map=lambda: self.map, forget_map=self._forget)
@@ -71,7 +71,13 @@ class Robot:
                 stamp_ns = BEGIN_NS + k * STEP_NS
                 self.odometry.note_transform("odom", "base_link", stamp_ns, pose(0.1 * k).seven(), is_static=False)
         self.mapper = Mapper(
-            options, self.link, self.odometry, self.mapped.append, self.notes.append, robot="r1", is_simulated=is_simulated
+            options,
+            self.link,
+            self.odometry,
+            on_mapped or self.mapped.append,
+            self.notes.append,
+            robot="r1",
+            is_simulated=is_simulated,
         )
 
     def _forget(self):

@@ -178,7 +178,7 @@ def test_the_copy_of_the_voxels_is_that_of_all_changes_in_order():
 def test_every_option_is_described_and_what_cannot_be_is_refused():
     assert set(DESCRIPTIONS) == set(Options.__dataclass_fields__)
     for values, words in [
-        ({"transform_period_s": 0.0}, "transform_period_s must be above 0, got 0.0"),
+        ({"transform_period_s": 0.0}, "transform_period_s must be 0.001 to 60 s, got 0.0"),
         ({"resolution": -1.0}, "resolution must be 0 or more, got -1.0"),
         ({"occupancy_min_z": 3.0}, "occupancy_min_z must be below occupancy_max_z, 2.0, got 3.0"),
         ({"occupancy_z_from": "sky"}, "occupancy_z_from must be floor or map, got sky"),
