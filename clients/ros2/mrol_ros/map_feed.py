@@ -25,6 +25,9 @@ PAUSE_S = 1.0
 
 TICK_S = 0.1
 
+CLOSE_MAX_S = 2.0
+"""How long threads may take to end: one that waits for the server ends with the process."""
+
 CLASSIFIED_MAX = 2_000_000
 """Places that are asked for whether they are free, at most."""
 
@@ -95,13 +98,14 @@ class MapFeed:
             thread.start()
 
     def close(self) -> None:
-        """Ends it, within a second or so."""
+        """Ends it, within two seconds."""
         self._closing.set()
         watch = self._watch
         if watch is not None:
             watch.close()
+        end_s = time.monotonic() + CLOSE_MAX_S
         for thread in self._threads:
-            thread.join(2 * self._options.request_timeout_s)
+            thread.join(max(0.0, end_s - time.monotonic()))
 
     def _follow(self) -> None:
         while not self._closing.is_set():

@@ -71,7 +71,9 @@ WARNING_MAX = 3000
 """Characters of a warning."""
 
 CLOSE_MAX_S = 2.0
-"""How long callbacks may take to end."""
+"""How long callbacks may take to end, and how long the request that is under way."""
+
+FRAME_SHOWN = 40
 
 FRAME_SHOWN = 40
 
@@ -174,7 +176,7 @@ class MrolNode(Node):
         """Ends the threads."""
         self._mapper.close()
         self._feed.close()
-        self._mapping.join(2 * self.options.request_timeout_s)
+        self._mapping.join(CLOSE_MAX_S)
         self._link.close()
 
     # What comes in.

@@ -245,6 +245,18 @@ def test_two_nodes_of_one_name_are_told_of_each_other(server, tmp_path):
         assert node.log.read_text().count("another program sends scans as robot 'cart'") == 1
 
 
+def test_ctrl_c_ends_the_node_while_the_server_says_nothing(server, tmp_path):
+    robot, proxy = Robot(), Proxy(server)
+    robot.start()
+    node = NodeProcess(tmp_path, proxy, robot="r1", request_timeout_s=600.0, **CLOUDS)
+    with running(proxy, robot, node):
+        wait_until(lambda: len(robot.poses) >= 2, 150, "poses")
+        proxy.freeze()
+        time.sleep(2)
+        assert node.stop() == 0
+    assert "Traceback" not in node.log.read_text()
+
+
 def test_a_callback_that_fails_is_told_and_the_others_go_on():
     context = rclpy.Context()
     context.init()

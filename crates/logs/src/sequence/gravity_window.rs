@@ -74,4 +74,35 @@ mod tests {
         }
         assert!(GravityWindow::default().at(0, &turned).is_none());
     }
+
+    #[test]
+    fn gravity_is_that_of_the_table_that_the_node_of_ros_follows_too() {
+        let table = include_str!("../../tests/fixtures/rules/gravity.txt");
+        let numbers = |text: &str| -> Vec<f64> {
+            text.split_whitespace().map(|number| number.parse().unwrap()).collect()
+        };
+        let rows: Vec<_> = table.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+        assert!(rows.len() > 10);
+        for row in rows {
+            let columns: Vec<&str> = row.split(';').map(str::trim).collect();
+            let [name, readings, time_ms, turn, expected] = columns[..] else { panic!("{row}") };
+            let mut window = GravityWindow::default();
+            for reading in readings.split(',').filter(|reading| !reading.is_empty()) {
+                let of = numbers(reading);
+                window.note(of[0] as i64 * 1_000_000, [of[1], of[2], of[3]]);
+            }
+            let q = numbers(turn);
+            let turn = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
+            let sensor_from_imu = Pose::from_parts(nalgebra::Translation3::identity(), turn);
+            match window.at(numbers(time_ms)[0] as i64 * 1_000_000, &sensor_from_imu) {
+                Some(gravity) => {
+                    assert_ne!(expected, "none", "{name}");
+                    let expected = Vector3::from_vec(numbers(expected));
+                    let found = Vector3::from(gravity.in_sensor()).normalize();
+                    assert!((found - expected).norm() < 1e-6, "{name}: {found}");
+                }
+                None => assert_eq!(expected, "none", "{name}"),
+            }
+        }
+    }
 }

@@ -9,4 +9,5 @@ mod hostile;
 mod mapping;
 mod mcap;
 mod sequence;
+mod shared_rules;
 mod support;
