@@ -269,12 +269,6 @@ fn what_cannot_be_imported_is_named_and_leaves_no_file() {
     write_ply(Path::new(&path("a.ply")), &[Point::new(1.0, 2.0, 3.0)]).unwrap();
     let said = refused(2, &[&path("a.ply")]);
     assert!(said.contains("--resolution METERS is needed: a file of points does not say"), "{said}");
-    if !cfg!(feature = "surveys") {
-        let said = refused(2, &[&path("a.las"), "--resolution", "0.1"]);
-        assert!(said.contains("feature `surveys`") && said.contains("--features released"), "{said}");
-        let said = complaint(&["export", &map, "--out", &path("a.e57")], 2);
-        assert!(said.contains(".e57 files") && said.contains("--features released"), "{said}");
-    }
 }
 
 #[test]

@@ -31,9 +31,12 @@ impl Converted {
                 let (axis, sign) = ([1, 2, 0], [-1.0, 1.0, 1.0]);
                 m[(axis[row], axis[column])] * sign[row] * sign[column]
             };
-            let about_y = of_uos(0, 2).asin();
-            let about_x = (-of_uos(1, 2)).atan2(of_uos(2, 2));
-            let about_z = (-of_uos(0, 1)).atan2(of_uos(0, 0));
+            let about_y = of_uos(0, 2).clamp(-1.0, 1.0).asin();
+            // Turned to a side, one of the other two angles is free.
+            let [about_x, about_z] = match of_uos(0, 2).abs() < 1.0 - 1e-9 {
+                true => [(-of_uos(1, 2)).atan2(of_uos(2, 2)), (-of_uos(0, 1)).atan2(of_uos(0, 0))],
+                false => [of_uos(2, 1).atan2(of_uos(1, 1)), 0.0],
+            };
             let angles = [about_x, about_y, about_z].map(|angle: f64| angle.to_degrees().to_string());
             fs::write(path("pose"), format!("{x} {y} {z}\n{}\n", angles.join(" "))).unwrap();
             let matrix = pose.to_homogeneous();

@@ -75,8 +75,6 @@ CLOSE_MAX_S = 2.0
 
 FRAME_SHOWN = 40
 
-FRAME_SHOWN = 40
-
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 TF_STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
