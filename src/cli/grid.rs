@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::remote::ServerOptions;
 use super::scope::ScopeOptions;
 use mrol::console::CliError;
+use mrol::console::NewFile;
 use mrol::console::Output;
 use mrol::console::count;
 use mrol::console::parse;
@@ -146,12 +147,15 @@ fn check_is_image(out: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Writes the image and its description, whose path is returned.
+/// Writes the image and its description, whose path is returned: both, or neither.
 fn write_files(grid: &Grid, image: &Path) -> Result<PathBuf, CliError> {
     let name = image.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let description = image.with_extension(DESCRIPTION);
-    fs::write(image, grid.to_pgm()).map_err(CliError::writing(image))?;
-    fs::write(&description, grid.to_yaml(&name)).map_err(CliError::writing(&description))?;
+    let (drawn, described) = (NewFile::at(image)?, NewFile::at(&description)?);
+    fs::write(drawn.path(), grid.to_pgm()).map_err(|problem| drawn.failed(problem))?;
+    fs::write(described.path(), grid.to_yaml(&name)).map_err(|problem| described.failed(problem))?;
+    drawn.keep()?;
+    described.keep()?;
     Ok(description)
 }
 

@@ -5,6 +5,7 @@
 mod credentials;
 pub mod error;
 pub mod map_report;
+mod new_file;
 pub mod output;
 pub mod parse;
 mod plan;
@@ -22,6 +23,7 @@ pub use truth::{poses_of_scans, true_poses};
 
 pub use self::credentials::CredentialOptions;
 pub use self::error::CliError;
+pub use self::new_file::{NewFile, check_is_map_file, check_is_no_input};
 pub use self::output::Output;
 pub use self::plan::{PlanLayer, plan};
 pub use self::points::points_of;

@@ -27,7 +27,7 @@ fn a_survey_of_seven_digits_goes_in_and_out_and_keeps_its_millimeters() {
         let said =
             objects(&["import", &fixture(name), "--resolution", "0.001", "--origin", origin, "--out", &map]);
         assert_eq!(said[0]["voxels"], 300, "{name}");
-        assert_eq!(said[0]["origin_m"], json!([388_096.0005, 5_819_450.0005, 33.9995]));
+        assert_eq!(said[0]["origin_m"], json!([388_096.000_5, 5_819_450.000_5, 33.9995]));
         let contents = map_file(&map).contents;
         // In the middle between the faces of voxels, half a millimeter below the points.
         let index = |k: i32| [13 * k - 1, 5999 - 17 * k, k % 50];

@@ -1,12 +1,10 @@
 //! The centers of voxels as a point cloud: .ply and .pcd.
 
-use std::path::Path;
-
 use nalgebra::Point3;
 
 use super::exported::Content;
 use super::source::Voxels;
-use mrol::console::CliError;
+use mrol::console::{CliError, NewFile};
 use mrol_files::FileKind;
 use mrol_map::geometry::Point;
 use mrol_map::scan::{write_pcd, write_ply};
@@ -15,12 +13,12 @@ use mrol_map::scan::{write_pcd, write_ply};
 ///
 /// # Errors
 /// When the file cannot be written.
-pub(super) fn write(kind: FileKind, out: &Path, voxels: &Voxels) -> Result<Content, CliError> {
+pub(super) fn write(kind: FileKind, out: &NewFile, voxels: &Voxels) -> Result<Content, CliError> {
     let points: Vec<Point> = voxels.centers_m().map(|center_m| Point::from(Point3::from(center_m))).collect();
     let written = match kind {
-        FileKind::Pcd => write_pcd(out, &points),
-        _ => write_ply(out, &points),
+        FileKind::Pcd => write_pcd(out.path(), &points),
+        _ => write_ply(out.path(), &points),
     };
-    written.map_err(CliError::writing(out))?;
+    written.map_err(|problem| out.failed(problem))?;
     Ok(Content::Centers { points: points.len() })
 }

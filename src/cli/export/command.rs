@@ -7,7 +7,7 @@ use super::octree::MapOctree;
 use super::source::Source;
 use super::{cloud, npz, recording, survey};
 use crate::cli::remote::ServerOptions;
-use mrol::console::{CliError, Output, parse};
+use mrol::console::{CliError, NewFile, Output, check_is_no_input, parse};
 use mrol_files::FileKind;
 use mrol_map::map::MapName;
 
@@ -61,24 +61,25 @@ pub(crate) struct Export {
 impl Export {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         let kind = self.kind()?;
+        check_is_no_input(&self.out, self.file.as_deref())?;
+        let out = NewFile::at(&self.out)?;
         let mut source = Source::open(self.file.as_deref(), self.name.clone(), &self.server).await?;
         let voxels = source.voxels(self.level).await?;
         let content = match kind {
-            FileKind::Ply | FileKind::Pcd => cloud::write(kind, &self.out, &voxels)?,
-            FileKind::Npz => npz::write(&self.out, &voxels, &output)?,
+            FileKind::Ply | FileKind::Pcd => cloud::write(kind, &out, &voxels)?,
+            FileKind::Npz => npz::write(&out, &voxels, &output)?,
             FileKind::Bt | FileKind::Ot if self.no_free => {
-                Content::Octree(MapOctree::occupied(&voxels)?.write(kind, &self.out)?)
+                Content::Octree(MapOctree::occupied(&voxels)?.write(kind, &out)?)
             }
             FileKind::Bt | FileKind::Ot => {
                 let free_space = source.free_space(&voxels)?;
                 let tree = MapOctree::with_free_space(&voxels, &free_space, &output).await?;
-                Content::Octree(tree.write(kind, &self.out)?)
+                Content::Octree(tree.write(kind, &out)?)
             }
-            FileKind::Las | FileKind::Laz | FileKind::E57 => {
-                survey::write(kind, &self.out, &voxels, &output)?
-            }
-            FileKind::Mcap => recording::write(&self.out, &voxels, source, self.band, &output).await?,
+            FileKind::Las | FileKind::Laz | FileKind::E57 => survey::write(kind, &out, &voxels, &output)?,
+            FileKind::Mcap => recording::write(&out, &voxels, source, self.band, &output).await?,
         };
+        out.keep()?;
         output.print(&Exported::of(&self.out, content, &voxels))
     }
 

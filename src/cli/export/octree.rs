@@ -2,14 +2,13 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
 
 use nalgebra::Point3;
 
 use super::exported::OctreeCells;
 use super::free_space::FreeSpace;
 use super::source::Voxels;
-use mrol::console::{CliError, Output, count};
+use mrol::console::{CliError, NewFile, Output, count};
 use mrol_files::FileKind;
 use mrol_files::octree::{
     CELL_INDEX_MAX, CELL_INDEX_MIN, CellBlock, CellBlocks, CellState, Leaf, LeafError, Octree,
@@ -111,17 +110,17 @@ impl MapOctree {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub(super) fn write(&self, kind: FileKind, out: &Path) -> Result<OctreeCells, CliError> {
+    pub(super) fn write(&self, kind: FileKind, out: &NewFile) -> Result<OctreeCells, CliError> {
         let has_probabilities = kind == FileKind::Ot;
         let write = || {
-            let mut file = BufWriter::new(File::create(out)?);
+            let mut file = BufWriter::new(File::create(out.path())?);
             match has_probabilities {
                 true => self.tree.write_full(self.resolution_m, &mut file)?,
                 false => self.tree.write_binary(self.resolution_m, &mut file)?,
             }
             file.flush()
         };
-        write().map_err(CliError::writing(out))?;
+        write().map_err(|problem| out.failed(problem))?;
         let Self { occupied, free, .. } = *self;
         Ok(OctreeCells { occupied, free, leaves: self.tree.len(), has_probabilities })
     }

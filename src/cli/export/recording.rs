@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::path::Path;
 
 use nalgebra::Point3;
 
 use super::exported::Content;
 use super::source::{Source, Voxels};
-use mrol::console::{CliError, Output};
+use mrol::console::{CliError, NewFile, Output};
 use mrol_files::{RecordedPose, begin_recording};
 use mrol_map::geometry::Point;
 use mrol_map::map::{MappedScan, RobotName};
@@ -23,7 +22,7 @@ const STEP_NS: u64 = 1_000_000_000;
 /// # Errors
 /// When the file cannot be written, or the server refuses.
 pub(super) async fn write(
-    out: &Path,
+    out: &NewFile,
     voxels: &Voxels,
     source: Source,
     band_m: [f64; 2],
@@ -41,8 +40,8 @@ pub(super) async fn write(
     let asked = QuestionScope { level: voxels.level, ..QuestionScope::default() };
     let grid = source.grid(GridQuestion { asked, scope }).await;
 
-    let failed = |error| CliError::failed(format!("{}: {error}", out.display()));
-    let file = File::create(out).map_err(CliError::writing(out))?;
+    let failed = |error| out.failed(error);
+    let file = File::create(out.path()).map_err(|problem| out.failed(problem))?;
     let mut recording = begin_recording(file, begin_ns).map_err(failed)?;
     let centers = voxels.centers_m().map(|center_m| Point::from(Point3::from(center_m)));
     recording.write_voxels(&centers.collect::<Vec<_>>()).map_err(failed)?;

@@ -1,12 +1,10 @@
 //! The centers of voxels as a survey: .las, .laz and .e57, in its coordinates.
 
-use std::path::Path;
-
 use uuid::Uuid;
 
 use super::exported::Content;
 use super::source::Voxels;
-use mrol::console::{CliError, Output};
+use mrol::console::{CliError, NewFile, Output};
 use mrol_files::FileKind;
 use mrol_files::survey::{LasKind, write_e57, write_las};
 
@@ -16,7 +14,7 @@ use mrol_files::survey::{LasKind, write_e57, write_las};
 /// When the file cannot be written, or cannot hold the voxels.
 pub(super) fn write(
     kind: FileKind,
-    out: &Path,
+    out: &NewFile,
     voxels: &Voxels,
     output: &Output,
 ) -> Result<Content, CliError> {
@@ -31,7 +29,7 @@ pub(super) fn write(
         FileKind::E57 => {
             let guid = format!("{{{}}}", Uuid::new_v4());
             write_e57(
-                out,
+                out.path(),
                 &guid,
                 centers.map(|[x, y, z]| [x + origin_m[0], y + origin_m[1], z + origin_m[2]]),
             )
@@ -39,10 +37,10 @@ pub(super) fn write(
         _ => {
             let las = if kind == FileKind::Laz { LasKind::Laz } else { LasKind::Las };
             let extent_m = voxels.centers_m().flatten().fold(0.0, |extent: f64, c| extent.max(c.abs()));
-            write_las(out, las, origin_m, extent_m, centers)
+            write_las(out.path(), las, origin_m, extent_m, centers)
         }
     };
     output.clear_bar();
-    result.map_err(|problem| CliError::failed(format!("{}: {problem}", out.display())))?;
+    result.map_err(|problem| out.failed(problem))?;
     Ok(Content::Survey { points: voxels.keys.len() })
 }

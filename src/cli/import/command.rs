@@ -7,7 +7,7 @@ use uuid::Uuid;
 use super::imported::{Imported, ImportedLine};
 use super::options::ImportOptions;
 use super::{cloud, e57, las, npz, octree};
-use mrol::console::{CliError, Output};
+use mrol::console::{CliError, Output, check_is_map_file, check_is_no_input};
 use mrol_files::FileKind;
 use mrol_store::{Disk, Snapshot};
 
@@ -39,6 +39,8 @@ pub(crate) struct Import {
 impl Import {
     pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
         check_folder(&self.out)?;
+        check_is_no_input(&self.out, [self.options.file.as_path()])?;
+        check_is_map_file(&self.out)?;
         let kind =
             FileKind::of(&self.options.file).map(FileKind::checked).transpose().map_err(CliError::usage)?;
         let imported = match kind {

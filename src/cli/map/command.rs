@@ -14,7 +14,7 @@ use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::poses_of_scans;
-use mrol::console::{OriginChoice, Survey};
+use mrol::console::{NewFile, OriginChoice, Survey, check_is_map_file, check_is_no_input};
 use mrol::offline::{KnownScan, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
@@ -149,7 +149,7 @@ impl Map {
         }
         let files = scan_files(&self.scans)?;
         let truth = self.poses_file().map(|path| poses_of_scans(path, &files, &output)).transpose()?;
-        self.check_folders()?;
+        self.check_outputs(files.iter().map(PathBuf::as_path))?;
 
         tell_order(&files, &output)?;
         let (survey, origin) = self.survey(&files, &output)?;
@@ -187,9 +187,18 @@ impl Map {
         Ok(PointFilter { keep_zeros: self.keep_zeros, ..filter })
     }
 
-    /// Checks that the folders of all outputs exist, so that a long run does not fail at its end.
-    pub(super) fn check_folders(&self) -> Result<(), CliError> {
-        self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))
+    /// Checks that the folders of all outputs exist, so that a long run does not fail at its end, and that none of
+    /// them is among `inputs`, or what its poses are read from.
+    pub(super) fn check_outputs<'a>(
+        &'a self,
+        inputs: impl Iterator<Item = &'a Path> + Clone,
+    ) -> Result<(), CliError> {
+        self.out.as_deref().map(check_is_map_file).transpose()?;
+        let poses = self.poses_file().map(PathBuf::as_path);
+        self.trajectory_out.iter().chain(&self.out).try_for_each(|path| {
+            check_folder(path)?;
+            check_is_no_input(path, inputs.clone().chain(poses))
+        })
     }
 
     /// A mapper of an empty map, by the options.
@@ -291,7 +300,9 @@ impl Map {
 
     fn write_results(&self, mapper: &Mapper, run: &Run) -> Result<(), CliError> {
         if let Some(path) = &self.trajectory_out {
-            write_trajectory(path, &run.trajectory).map_err(CliError::writing(path))?;
+            let file = NewFile::at(path)?;
+            write_trajectory(file.path(), &run.trajectory).map_err(|problem| file.failed(problem))?;
+            file.keep()?;
         }
         if let Some(path) = &self.out {
             Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk::default(), path)?;

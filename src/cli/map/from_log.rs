@@ -1,6 +1,6 @@
 //! `mrol map` of a robot's log.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::command::Map;
 use super::run::{KnownPoses, Run, Usable, in_file};
@@ -29,7 +29,11 @@ impl Map {
         output: Output,
     ) -> Result<(), CliError> {
         self.refuse_options_of_files()?;
-        self.check_folders()?;
+        let inputs: Vec<PathBuf> = match std::fs::read_dir(path) {
+            Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+            Err(_) => vec![path.to_owned()],
+        };
+        self.check_outputs(inputs.iter().map(PathBuf::as_path))?;
         let (log, mut scans) = LogFile::open(path, &self.log, &output)?;
         let settings = self.map_settings();
         let guess = self.guess.unwrap_or(GuessName::ConstantVelocity);

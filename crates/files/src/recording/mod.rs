@@ -17,7 +17,8 @@ mod mcap_recorder;
 #[cfg(feature = "recordings")]
 mod message;
 mod recorder;
-#[cfg(all(test, feature = "recordings"))]
+#[cfg(feature = "recordings")]
+#[cfg(test)]
 mod tests;
 
 pub use begin::begin_recording;

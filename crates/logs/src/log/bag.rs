@@ -68,6 +68,8 @@ impl Bag {
         let metadata = std::fs::metadata(path)?;
         let files = match metadata.is_dir() {
             true => files_of_folder(path)?,
+            // Whoever opens a named pipe waits for its writer.
+            false if !metadata.is_file() => return Err(LogError::NotAFile(excerpt(&path.to_string_lossy()))),
             false => vec![BagFile { path: path.to_owned(), bytes: metadata.len(), name: None }],
         };
         let bytes = files.iter().map(|file| file.bytes).sum();
@@ -169,6 +171,9 @@ fn files_of_folder(folder: &Path) -> Result<Vec<BagFile>, LogError> {
         if entry.file_type()?.is_symlink() {
             return Err(LogError::Link(name));
         }
+        if !entry.file_type()?.is_file() {
+            return Err(LogError::NotAFile(name));
+        }
         if is_compressed(&path) && path.with_extension("").exists() {
             continue;
         }
@@ -186,6 +191,10 @@ fn has_ending(path: &Path) -> bool {
 fn is_compressed(path: &Path) -> bool {
     path.to_string_lossy().to_ascii_lowercase().ends_with(COMPRESSED)
 }
+
+/// How a database of SQLite begins.
+#[cfg(feature = "sqlite")]
+const DATABASE_BEGIN: &[u8] = b"SQLite format 3\0";
 
 /// The messages of a file, by its ending: without one that is known, it is taken for MCAP.
 fn messages_of(path: &Path) -> Result<Box<dyn Messages + Send>, LogError> {
@@ -215,9 +224,15 @@ fn messages_of_database(path: &Path) -> Result<Box<dyn Messages + Send>, LogErro
     if !is_compressed(path) {
         return Ok(Box::new(DatabaseReader::open(path)?));
     }
-    let mut unpacked = tempfile::Builder::new().prefix("mrol-log-").suffix(".db3").tempfile()?;
     let mut database = decompressed(BufReader::with_capacity(BUFFER_BYTES, File::open(path)?))?;
-    std::io::copy(&mut database, &mut unpacked)?;
+    // What is no database is not unpacked.
+    let mut begin = Vec::new();
+    (&mut database).take(DATABASE_BEGIN.len() as u64).read_to_end(&mut begin)?;
+    if begin != DATABASE_BEGIN {
+        return Err(LogError::NoBag(format!("what is compressed in it begins with {begin:02x?}")));
+    }
+    let mut unpacked = tempfile::Builder::new().prefix("mrol-log-").suffix(".db3").tempfile()?;
+    std::io::copy(&mut (&begin[..]).chain(database), &mut unpacked)?;
     Ok(Box::new(DatabaseReader::open_unpacked(unpacked)?))
 }
 

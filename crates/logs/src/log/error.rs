@@ -31,6 +31,9 @@ pub enum LogError {
         "{0} in the folder is a link, and what links lead to is not read: give the folder that has the file"
     )]
     Link(String),
+    /// What may have no end.
+    #[error("{0} is no regular file: a log is read twice, from its begin")]
+    NotAFile(String),
     /// A format that this program was built without.
     #[error(
         "databases are read by programs that were built with the feature `bags`, as the released ones are: \

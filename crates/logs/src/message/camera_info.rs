@@ -19,6 +19,10 @@ pub struct CameraInfo {
     pub intrinsics: [f64; 9],
     /// The projection matrix of images that were rectified (`P`), row by row.
     pub projection: [f64; 12],
+    /// Pixels that are one, along a row and along a column; 0 is 1.
+    pub binning: [u32; 2],
+    /// Column and row at which images begin that are a part of what the camera sees.
+    pub offset: [u32; 2],
 }
 
 impl CameraInfo {
@@ -40,6 +44,9 @@ impl CameraInfo {
         let intrinsics = cursor.f64s()?;
         // The rotation to the rectified images.
         cursor.f64s::<9>()?;
-        Ok(Self { height, width, distortion, intrinsics, projection: cursor.f64s()? })
+        let projection = cursor.f64s()?;
+        let binning = [cursor.u32()?, cursor.u32()?];
+        let offset = [cursor.u32()?, cursor.u32()?];
+        Ok(Self { height, width, distortion, intrinsics, projection, binning, offset })
     }
 }

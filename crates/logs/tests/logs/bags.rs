@@ -120,6 +120,30 @@ const MESSAGES: &str =
     "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);";
 
 #[test]
+fn what_is_no_regular_file_is_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("run_1.mcap")).unwrap();
+    fs::copy(fixture("zstd.mcap"), folder.path().join("run_0.mcap")).unwrap();
+    for path in [folder.path().to_owned(), folder.path().join("run_1.mcap")] {
+        let told = refusal(&path).to_string();
+        assert!(told.contains("run_1.mcap is no regular file"), "{told}");
+    }
+}
+
+#[test]
+fn a_compressed_file_that_is_no_database_is_not_unpacked_and_computed_columns_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let zeros = folder.path().join("zeros.db3.zstd");
+    fs::write(&zeros, zstd::bulk::compress(&vec![0; 10 << 20], 3).unwrap()).unwrap();
+    assert!(refusal(&zeros).to_string().contains("what is compressed in it begins with"));
+    let computed = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,
+                    data BLOB GENERATED ALWAYS AS (zeroblob(60000000)) VIRTUAL);
+                    INSERT INTO messages(topic_id, timestamp) VALUES (1, 1), (1, 2);";
+    let (_folder, computed) = database(&format!("{TOPICS} {computed}"));
+    assert!(refusal(&computed).to_string().contains("columns of its tables are computed"));
+}
+
+#[test]
 fn hostile_databases_neither_grow_nor_hang() {
     // A view in the place of a table, whose rows have no end.
     let endless = "CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n) \

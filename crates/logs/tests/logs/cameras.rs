@@ -40,6 +40,11 @@ fn depth_m(u: u32, v: u32) -> Option<f32> {
 }
 
 fn camera_info(distortion: &[f64], is_rectified: bool) -> Vec<u8> {
+    camera_info_of(distortion, is_rectified, 0.0, [0; 4])
+}
+
+/// [`camera_info`] with a skew, and pixels that are one along a row and a column, from a column and a row on.
+fn camera_info_of(distortion: &[f64], is_rectified: bool, skew: f64, part: [u32; 4]) -> Vec<u8> {
     let mut writer = CdrWriter::new(false);
     writer.header(START_NS, "camera_optical");
     writer.u32(HEIGHT);
@@ -48,10 +53,14 @@ fn camera_info(distortion: &[f64], is_rectified: bool) -> Vec<u8> {
     writer.u32(distortion.len() as u32);
     distortion.iter().for_each(|&number| writer.f64(number));
     let [x, y, cx, cy] = CAMERA;
-    [x, 0.0, cx, 0.0, y, cy, 0.0, 0.0, 1.0].into_iter().for_each(|number| writer.f64(number));
+    [x, skew, cx, 0.0, y, cy, 0.0, 0.0, 1.0].into_iter().for_each(|number| writer.f64(number));
     (0..9).for_each(|_| writer.f64(0.0));
     let of_rectified = [2.0 * x, 0.0, cx, 0.0, 0.0, 2.0 * y, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
     of_rectified.into_iter().for_each(|number| writer.f64(if is_rectified { number } else { 0.0 }));
+    part.into_iter().for_each(|number| writer.u32(number));
+    // Height and width of the part, and whether it is to be rectified.
+    (0..2).for_each(|_| writer.u32(0));
+    writer.u8(0);
     writer.finish()
 }
 
@@ -90,9 +99,15 @@ fn pixels_are_points_of_a_pinhole_in_either_unit_and_byte_order() {
     let size = [WIDTH, HEIGHT];
     let meters = |u, v| depth_m(u, v).unwrap_or(f32::NAN).to_be_bytes().to_vec();
     let images = [image("16UC1", false, size, millimeters), image("32FC1", true, size, meters)];
-    for (image, scale) in images.iter().flat_map(|image| [(image, 1.0), (image, 2.0)]) {
-        let infos = [camera_info(&[0.0; 5], scale == 2.0)];
-        let points = points(&log("/camera/depth/image_rect_raw", image, &infos)).unwrap();
+    let rectified = "/camera/depth/image_rect_raw";
+    let of_lens = (false, rectified, 1.0);
+    // An image that nobody rectified is as the lens projects, whatever is told of rectified ones.
+    let forms = [of_lens, (true, rectified, 2.0), (true, "/camera/depth/image_raw", 1.0)];
+    for (image, (is_rectified, topic, scale)) in
+        images.iter().flat_map(|image| forms.map(|form| (image, form)))
+    {
+        let infos = [camera_info(&[0.0; 5], is_rectified)];
+        let points = points(&log(topic, image, &infos)).unwrap();
         assert_eq!(points.len(), 12);
         for (k, point) in points.iter().enumerate() {
             let (u, v) = (k as u32 % WIDTH, k as u32 / WIDTH);
@@ -127,6 +142,14 @@ fn images_without_depths_and_cameras_that_are_not_known_are_refused_in_words() {
     assert!(points(&log("/camera/depth/image_rect", &depths, &[camera_info(&[0.1, 0.0], true)])).is_ok());
     let many = refused(raw, &depths, &[camera_info(&[0.0; 15], true)]).to_string();
     assert!(many.contains("no sensor_msgs/CameraInfo"), "{many}");
+    let skewed = refused(raw, &depths, &[camera_info_of(&[], false, 50.0, [0; 4])]).to_string();
+    assert!(skewed.contains("has the skew 50"), "{skewed}");
+    for part in [[2, 2, 0, 0], [0, 0, 20, 20], [1, 1, 0, 3]] {
+        let of_part = refused(raw, &depths, &[camera_info_of(&[], false, 0.0, part)]).to_string();
+        assert!(of_part.contains("record whole images"), "{part:?}: {of_part}");
+    }
+    let whole = [camera_info_of(&[], false, 0.0, [1, 1, 0, 0])];
+    assert!(points(&log(raw, &depths, &whole)).is_ok());
     // A camera that is told differently later.
     let told = survey(&log(raw, &depths, &[camera_info(&[], false), camera_info(&[], true)])).contradictions;
     assert!(matches!(&told[..], [only] if only.contains("changes within the log")), "{told:?}");

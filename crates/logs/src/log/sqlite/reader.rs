@@ -10,7 +10,7 @@ use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Error, ErrorCode, OpenFlags, OptionalExtension};
-use tempfile::{NamedTempFile, TempPath};
+use tempfile::NamedTempFile;
 
 use crate::log::error::{Damage, DamageKind, LogError, Place};
 use crate::log::message::{Topic, is_name};
@@ -27,6 +27,9 @@ const ZSTD_WINDOW_LOG_MAX: u32 = 25;
 
 const TABLES: &str =
     "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('topics', 'messages')";
+/// Columns whose values are computed, of which a small file may have as many as it likes.
+const COMPUTED: &str = "SELECT count(*) FROM (SELECT hidden FROM pragma_table_xinfo('topics') UNION ALL \
+                        SELECT hidden FROM pragma_table_xinfo('messages')) WHERE hidden <> 0";
 const TOPICS: &str = "SELECT id, name, type, serialization_format FROM topics ORDER BY rowid";
 const NEXT: &str =
     "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid > ?1 ORDER BY rowid LIMIT 1";
@@ -48,8 +51,6 @@ pub struct DatabaseReader {
     numbers: BTreeMap<i64, usize>,
     topics: Vec<Topic>,
     damage: Option<Damage>,
-    /// The file, where it is there for this reader alone.
-    _unpacked: Option<TempPath>,
 }
 
 impl DatabaseReader {
@@ -78,22 +79,18 @@ impl DatabaseReader {
         if tables != 2 {
             return Err(LogError::NoBag("it has no tables `topics` and `messages`".to_owned()));
         }
+        let computed: i64 = database.query_row(COMPUTED, [], |row| row.get(0)).map_err(no_bag)?;
+        if computed != 0 {
+            return Err(LogError::NoBag(
+                "columns of its tables are computed, where those of ROS 2 are stored".to_owned(),
+            ));
+        }
         let rows: (Option<i64>, Option<i64>) =
             database.query_row(FIRST_AND_LAST, [], |row| Ok((row.get(0)?, row.get(1)?))).map_err(no_bag)?;
         let (numbers, topics) = read_topics(&database).map_err(no_bag)?;
         let rows = (rows.0.unwrap_or(0), rows.1.unwrap_or(0));
         let row = rows.0.saturating_sub(1);
-        Ok(Self {
-            database,
-            bytes,
-            rows,
-            row,
-            data: Vec::new(),
-            numbers,
-            topics,
-            damage: None,
-            _unpacked: None,
-        })
+        Ok(Self { database, bytes, rows, row, data: Vec::new(), numbers, topics, damage: None })
     }
 
     /// A reader of a file that goes with it.
@@ -103,7 +100,9 @@ impl DatabaseReader {
     pub(in crate::log) fn open_unpacked(file: NamedTempFile) -> Result<Self, LogError> {
         let path = file.into_temp_path();
         let reader = Self::open(&path)?;
-        Ok(Self { _unpacked: Some(path), ..reader })
+        // The system keeps what is open until nobody has it open, however this process ends.
+        path.close()?;
+        Ok(reader)
     }
 
     /// Reads the next row; none at the end. Its topic is none where it is of no topic that is told.
