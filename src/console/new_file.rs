@@ -111,10 +111,10 @@ mod tests {
         let path = folder.path().join("a.ply");
         let names = || fs::read_dir(folder.path()).unwrap().count();
         fs::write(&path, "before").unwrap();
-        let given_up = NewFile::at(&path).unwrap();
-        fs::write(given_up.path(), "a par").unwrap();
-        assert!(given_up.failed("full").to_string().contains("a.ply: cannot be written: full"));
-        drop(given_up);
+        let cancelled = NewFile::at(&path).unwrap();
+        fs::write(cancelled.path(), "a par").unwrap();
+        assert!(cancelled.failed("full").to_string().contains("a.ply: cannot be written: full"));
+        drop(cancelled);
         assert_eq!((fs::read(&path).unwrap(), names()), (b"before".to_vec(), 1));
         let kept = NewFile::at(&path).unwrap();
         fs::write(kept.path(), "after").unwrap();
