@@ -272,6 +272,28 @@ fn what_cannot_be_imported_is_named_and_leaves_no_file() {
 }
 
 #[test]
+fn what_is_read_is_not_replaced_and_a_map_file_is_named_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (map, scan, poses) = (path("a.mrol"), path("a.ply"), path("poses.txt"));
+    written(&map, None, &some_voxels());
+    objects(&["export", &map, "--out", &scan]);
+    std::fs::write(&poses, "0 0 0 0 0 0 0 1\n").unwrap();
+    let files = || [&map, &scan, &poses].map(|path| std::fs::read(path).unwrap());
+    let before = files();
+    let import = ["import", &scan, "--resolution", "0.1", "--out"];
+    assert!(complaint(&[&import[..], &[&scan]].concat(), 2).contains("is to be read, and would be replaced"));
+    assert!(complaint(&[&import[..], &[&poses]].concat(), 2).contains("must end in .mrol"));
+    let mapping = ["map", &scan, "--resolution", "0.1", "--poses", &poses];
+    for out in [&scan, &poses] {
+        let said = complaint(&[&mapping[..], &["--trajectory-out", out]].concat(), 2);
+        assert!(said.contains("is to be read, and would be replaced"), "{said}");
+    }
+    assert!(complaint(&[&mapping[..], &["--out", &path("b.ply")]].concat(), 2).contains("must end in .mrol"));
+    assert_eq!(files(), before);
+}
+
+#[test]
 fn an_octree_that_is_too_large_is_refused_with_what_helps() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
