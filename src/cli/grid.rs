@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::remote::ServerOptions;
+use super::map_source::{MapSource, MapSourceOptions};
 use super::scope::ScopeOptions;
 use mrol::console::CliError;
 use mrol::console::NewFile;
@@ -19,7 +19,7 @@ use mrol_client::Client;
 use mrol_map::map::MapName;
 use mrol_map::planning::{BandFrom, Grid, GridArea};
 use mrol_service::{GridQuestion, GridScope};
-use mrol_store::{Disk, Snapshot};
+use mrol_store::Snapshot;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -45,14 +45,8 @@ const IMAGE: &str = "pgm";
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DrawGrid {
-    /// A map file, as `mrol map --out` and `mrol snapshot` write it
-    #[arg(value_name = "FILE.mrol", required_unless_present = "name", conflicts_with = "name")]
-    file: Option<PathBuf>,
-    /// Instead of a file: the name of a map on a server
-    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
-    name: Option<MapName>,
     #[command(flatten)]
-    server: ServerOptions,
+    map: MapSourceOptions,
     /// Where to write the image, a PGM; the description gets the same name with .yaml
     #[arg(long, value_name = "FILE.pgm")]
     out: PathBuf,
@@ -77,7 +71,7 @@ pub(super) struct DrawGrid {
 
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { file, name, server, out, band, band_from, area, cell, unknown, asked } = self;
+        let Self { map, out, band, band_from, area, cell, unknown, asked } = self;
         check_is_image(&out)?;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope {
@@ -88,10 +82,9 @@ impl DrawGrid {
             tells_unknown: unknown,
         };
         let question = GridQuestion { asked: asked.scope(), scope };
-        let (grid, voxel_m, revisions) = match (&file, &name) {
-            (Some(file), _) => drawn_of_file(file, &question)?,
-            (None, Some(name)) => drawn_of_server(&server.connect().await?, name, question).await?,
-            (None, None) => return Err(CliError::usage("a map file or --map is needed")),
+        let (grid, voxel_m, revisions) = match map.open().await? {
+            MapSource::File(snapshot) => drawn_of_file(*snapshot, &question)?,
+            MapSource::Server(client, name) => drawn_of_server(&client, &name, question).await?,
         };
         if grid.cells() == 0 {
             let message =
@@ -113,12 +106,12 @@ impl DrawGrid {
 /// The grid of a map file, the side of its finest voxels in meters, and the revisions of its first and its last part.
 type DrawnOf = (Grid, f64, [u64; 2]);
 
-fn drawn_of_file(file: &Path, question: &GridQuestion) -> Result<DrawnOf, CliError> {
-    let snapshot = Snapshot::read(&Disk::default(), file)?;
+fn drawn_of_file(snapshot: Snapshot, question: &GridQuestion) -> Result<DrawnOf, CliError> {
     let (voxel_m, revision) = (snapshot.settings.resolution_m, snapshot.contents.revision);
     if question.asked.min_revision.is_some_and(|least| revision < least) {
-        let file = file.display();
-        return Err(CliError::failed(format!("{file} is of revision {revision}, before --min-revision")));
+        return Err(CliError::failed(format!(
+            "the map file is of revision {revision}, before --min-revision"
+        )));
     }
     Ok((grid_of(snapshot, question)?, voxel_m, [revision; 2]))
 }
@@ -147,7 +140,7 @@ fn check_is_image(out: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Writes the image and its description, whose path is returned: both, or neither.
+/// Writes the image and its description, whose path is returned. Both are whole before one of them is put in its place.
 fn write_files(grid: &Grid, image: &Path) -> Result<PathBuf, CliError> {
     let name = image.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let description = image.with_extension(DESCRIPTION);

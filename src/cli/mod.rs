@@ -28,6 +28,7 @@ mod localize;
 mod log;
 mod man;
 mod map;
+mod map_source;
 mod maps;
 mod met;
 mod nearest;

@@ -68,7 +68,7 @@ fn coordinates_that_f32_does_not_hold_are_refused_with_the_origin_to_give() {
 }
 
 #[test]
-fn scans_of_an_e57_go_in_at_their_poses_and_what_they_saw_through_is_free() {
+fn scans_of_an_e57_go_in_at_their_poses_with_viewpoints() {
     let folder = tempfile::tempdir().unwrap();
     let map = folder.path().join("site.mrol").display().to_string();
     let import = [

@@ -4,12 +4,10 @@ use std::path::PathBuf;
 
 use super::exported::{Content, Exported};
 use super::octree::MapOctree;
-use super::source::Source;
 use super::{cloud, npz, recording, survey};
-use crate::cli::remote::ServerOptions;
+use crate::cli::map_source::MapSourceOptions;
 use mrol::console::{CliError, NewFile, Output, check_is_no_input, parse};
 use mrol_files::FileKind;
-use mrol_map::map::MapName;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -36,14 +34,8 @@ The file is a picture of the map: scans and trajectory are in map files alone, w
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Export {
-    /// A map file, as `mrol map --out` and `mrol snapshot` write it
-    #[arg(value_name = "FILE.mrol", required_unless_present = "name", conflicts_with = "name")]
-    file: Option<PathBuf>,
-    /// Instead of a file: the name of a map on a server
-    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
-    name: Option<MapName>,
     #[command(flatten)]
-    server: ServerOptions,
+    map: MapSourceOptions,
     /// Level of the voxels: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
@@ -61,9 +53,9 @@ pub(crate) struct Export {
 impl Export {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         let kind = self.kind()?;
-        check_is_no_input(&self.out, self.file.as_deref())?;
+        check_is_no_input(&self.out, self.map.file.as_deref())?;
         let out = NewFile::at(&self.out)?;
-        let mut source = Source::open(self.file.as_deref(), self.name.clone(), &self.server).await?;
+        let mut source = self.map.open().await?;
         let voxels = source.voxels(self.level).await?;
         let content = match kind {
             FileKind::Ply | FileKind::Pcd => cloud::write(kind, &out, &voxels)?,

@@ -6,7 +6,8 @@ use std::fs::File;
 use nalgebra::Point3;
 
 use super::exported::Content;
-use super::source::{Source, Voxels};
+use super::source::Voxels;
+use crate::cli::map_source::MapSource;
 use mrol::console::{CliError, NewFile, Output};
 use mrol_files::{RecordedPose, begin_recording};
 use mrol_map::geometry::Point;
@@ -24,7 +25,7 @@ const STEP_NS: u64 = 1_000_000_000;
 pub(super) async fn write(
     out: &NewFile,
     voxels: &Voxels,
-    source: Source,
+    source: MapSource,
     band_m: [f64; 2],
     output: &Output,
 ) -> Result<Content, CliError> {

@@ -1,9 +1,7 @@
 //! What is exported: a map of a file, or of a server.
 
-use std::path::Path;
-
 use super::free_space::FreeSpace;
-use crate::cli::remote::ServerOptions;
+use crate::cli::map_source::MapSource;
 use mrol::console::CliError;
 use mrol::offline::grid_of;
 use mrol_client::Client;
@@ -11,33 +9,10 @@ use mrol_map::map::{MapName, MapOrigin, MapSettings, MappedScan};
 use mrol_map::planning::Grid;
 use mrol_map::voxel::{Lattice, VoxelKey};
 use mrol_service::{GridQuestion, ListingRequest};
-use mrol_store::{Disk, Snapshot};
+use mrol_store::Snapshot;
 
-/// A map that is exported.
-pub(super) enum Source {
-    /// Of a file.
-    File(Box<Snapshot>),
-    /// Of a server.
-    Server(Client, MapName),
-}
-
-impl Source {
-    /// The map of a file, or of that name on a server.
-    ///
-    /// # Errors
-    /// When the file cannot be read, or the server cannot be reached.
-    pub(super) async fn open(
-        file: Option<&Path>,
-        name: Option<MapName>,
-        server: &ServerOptions,
-    ) -> Result<Self, CliError> {
-        match (file, name) {
-            (Some(file), _) => Ok(Self::File(Box::new(Snapshot::read(&Disk::default(), file)?))),
-            (None, Some(name)) => Ok(Self::Server(server.connect().await?, name)),
-            (None, None) => Err(CliError::usage("a map file or --map is needed")),
-        }
-    }
-
+/// What is exported of a map.
+impl MapSource {
     /// The occupied voxels of a level.
     ///
     /// # Errors
