@@ -76,6 +76,12 @@ impl<H: Send + Sync + 'static> AnswerBody<H> {
         Self { body: Some(body), rest: Bytes::new(), held, endings }
     }
 
+    /// True of what goes out at once and in whole. It was allowed when it was made, and an ending in the moment between
+    /// would leave the client without even a status.
+    fn lies_ready(&self) -> bool {
+        self.size_hint().exact().is_some_and(|bytes| bytes <= PIECE_BYTES as u64)
+    }
+
     /// Why the answer ends now, if it does.
     fn poll_ended(&mut self, context: &mut Context<'_>) -> Option<ServiceError> {
         self.endings.when.iter_mut().find_map(|ending| match ending.as_mut().poll(context) {
@@ -105,7 +111,8 @@ impl<H: Send + Sync + 'static> HttpBody for AnswerBody<H> {
         if self.body.is_none() {
             return Poll::Ready(None);
         }
-        if let Some(reason) = self.poll_ended(context) {
+        let ended = if self.lies_ready() { None } else { self.poll_ended(context) };
+        if let Some(reason) = ended {
             (self.body, self.rest) = (None, Bytes::new());
             let cut = axum::Error::new(reason.clone());
             return Poll::Ready(Some((self.endings.trailers)(reason).map(Frame::trailers).ok_or(cut)));
@@ -180,11 +187,21 @@ mod tests {
         assert!(gone.await.is_err() && body.is_end_stream() && body.frame().await.is_none());
     }
 
+    fn cut_at_once(body: Body) -> AnswerBody<()> {
+        let cut: Ending = Box::pin(async { ServiceError::new(Reason::Draining, "cut") });
+        AnswerBody::new(body, None, (), Endings { when: vec![cut], ..Endings::none() })
+    }
+
     #[tokio::test]
     async fn an_answer_without_trailers_is_cut() {
-        let cut: Ending = Box::pin(async { ServiceError::new(Reason::Draining, "cut") });
-        let endings = Endings { when: vec![cut], ..Endings::none() };
-        let mut body = AnswerBody::new(Body::from("whole"), None, (), endings);
+        let mut body = cut_at_once(Body::from(vec![0; PIECE_BYTES + 1]));
         assert!(body.frame().await.unwrap().is_err() && body.frame().await.is_none());
+    }
+
+    #[tokio::test]
+    async fn an_answer_that_lies_ready_is_sent_whole() {
+        let mut body = cut_at_once(Body::from("whole"));
+        assert_eq!(body.frame().await.unwrap().unwrap().into_data().unwrap(), "whole");
+        assert!(body.is_end_stream());
     }
 }

@@ -36,6 +36,7 @@ mod observers;
 mod query;
 mod rays;
 mod remote;
+mod scan_file_options;
 mod scan_report;
 mod scope;
 mod snapshot;

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use mrol::console::{CliError, OriginChoice, Survey, parse};
+use super::scan_file_options::ScanFileOptions;
+use mrol::console::{CliError, OriginChoice, ScanReader, Survey, parse};
 use mrol_client::Client;
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapName, MapOrigin, MapSettings};
-use mrol_map::scan::{Columns, read_exact_points_by};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct SurveyOptions {
@@ -17,9 +17,8 @@ pub(super) struct SurveyOptions {
     /// subtracted from them, and answers are in the map's coordinates [default: they are the map's]
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
     origin: Option<OriginChoice>,
-    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
-    #[arg(long, value_name = "NAMES")]
-    columns: Option<Columns>,
+    #[command(flatten)]
+    scan_files: ScanFileOptions,
 }
 
 impl SurveyOptions {
@@ -51,7 +50,12 @@ impl SurveyOptions {
                 Some(given)
             }
         };
-        Ok(Survey::of(first, origin, has_poses, settings.resolution_m).with_columns(self.columns))
+        Ok(Survey::of(first, origin, has_poses, settings.resolution_m).with_reader(self.reader()))
+    }
+
+    /// How files of points are read.
+    pub(super) fn reader(&self) -> ScanReader {
+        self.scan_files.reader()
     }
 
     /// The points of a file, in f64.
@@ -59,7 +63,7 @@ impl SurveyOptions {
     /// # Errors
     /// The file cannot be read.
     pub(super) fn read(&self, file: &Path) -> Result<Vec<Point3<f64>>, CliError> {
-        Ok(read_exact_points_by(file, self.columns)?)
+        self.reader().read(file)
     }
 
     /// The points of a file or, without one, those given, in f64, with how they lie to the map.

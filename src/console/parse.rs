@@ -36,6 +36,15 @@ pub fn sensor_height(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses how many steps of a depth image a meter has.
+pub fn depth_scale(text: &str) -> Result<f64, String> {
+    let [steps] = numbers(text, "a number of steps a meter")?;
+    match steps > 0.0 && f64::is_finite(steps) {
+        true => Ok(steps),
+        false => Err(format!("must be above 0, got {steps}")),
+    }
+}
+
 /// Parses a point "x,y,z", meters.
 pub fn point(text: &str) -> Result<Point, String> {
     let [x, y, z] = numbers(text, "x,y,z")?;

@@ -6,9 +6,10 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use super::error::CliError;
 use super::output::Output;
+use super::scan_reader::ScanReader;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapOrigin;
-use mrol_map::scan::{Columns, PointFilter, UnitDoubt, read_exact_points_by};
+use mrol_map::scan::{PointFilter, UnitDoubt};
 
 /// Coordinates are too coarse where rounding them to f32 moves a point by more than this share of a voxel.
 const ROUNDING_SHARE: f64 = 1.0 / 16.0;
@@ -57,8 +58,8 @@ pub struct Survey {
     /// What is subtracted from the points of every file, and put into their poses.
     shift: Vector3<f64>,
     resolution_m: f64,
-    /// What the columns of files hold, where somebody said so.
-    columns: Option<Columns>,
+    /// How files are read.
+    reader: ScanReader,
 }
 
 impl Survey {
@@ -75,14 +76,14 @@ impl Survey {
             origin: origin.unwrap_or_default(),
             shift: shift.unwrap_or_default(),
             resolution_m,
-            columns: None,
+            reader: ScanReader::default(),
         }
     }
 
-    /// The survey of files with these columns.
+    /// The survey of files that are read so.
     #[must_use]
-    pub fn with_columns(self, columns: Option<Columns>) -> Self {
-        Self { columns, ..self }
+    pub fn with_reader(self, reader: ScanReader) -> Self {
+        Self { reader, ..self }
     }
 
     /// Notes that the points of the first file do not seem to be in meters, if that is so.
@@ -99,7 +100,7 @@ impl Survey {
     /// # Errors
     /// The file cannot be read, or its points are still too far from 0 for f32.
     pub fn read(&self, file: &Path) -> Result<Vec<Point>, CliError> {
-        let points = read_exact_points_by(file, self.columns)?;
+        let points = self.reader.read(file)?;
         self.check(&file.display().to_string(), &points)?;
         let zero = Point3::origin();
         // 0 0 0 says that nothing returned, wherever the survey is.

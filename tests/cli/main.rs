@@ -3,6 +3,7 @@
 
 mod broken_connections;
 mod demo;
+mod depth_images;
 mod doctor;
 mod errors;
 mod files;

@@ -1,4 +1,4 @@
-//! Maps as files of other mapping programs, read and written.
+//! Files of other mapping programs: maps, read and written, and scans.
 //!
 //! ```text
 //! file_kind        which program a file is of, by its extension
@@ -7,6 +7,7 @@
 //! survey           LAS, LAZ and E57, with the feature `surveys`
 //! mapped_points    points to the voxels and moments of a map, part by part
 //!   collected_voxels   voxels that come one by one          counted   a file, with the place where reading stands
+//! depth_image      a scan of a depth camera, as PNG
 //! recording        a map as a log, which viewers of logs show
 //! ```
 //!
@@ -15,6 +16,7 @@
 
 mod collected_voxels;
 mod counted;
+mod depth_image;
 mod file_kind;
 mod mapped_points;
 pub mod npz;
@@ -22,6 +24,7 @@ pub mod octree;
 mod recording;
 pub mod survey;
 
+pub use depth_image::{DepthImageError, DepthImages};
 pub use file_kind::{FileKind, LackingFeature};
 pub use mapped_points::MappedPoints;
 pub use recording::{RecordedPose, Recorder, RecordingError, begin_recording};

@@ -11,13 +11,13 @@ use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use crate::cli::log::LogOptions;
 use crate::cli::maps::OptionalSettings;
 use crate::cli::remote::MapOptions;
+use crate::cli::scan_file_options::ScanFileOptions;
 use crate::cli::scan_report::tell_order;
 use mrol::console::{CliError, OriginChoice, Output, Survey, parse, poses_of_scans};
 use mrol_client::{Client, NewMap, new_session};
 use mrol_map::geometry::Pose;
 use mrol_map::map::{MapOrigin, RobotName, SessionName};
 use mrol_map::mapping::Guess;
-use mrol_map::scan::{Columns, read_exact_points_by, scan_files};
 
 /// Side of the voxels of a map that does not tell, meters: points that f32 rounds by more than 1/16 of it are refused.
 const RESOLUTION_UNKNOWN_M: f64 = 0.1;
@@ -40,7 +40,7 @@ then has the --session and --first-scan-id with which the same command goes on, 
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Insert {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32 .3d; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
+    /// .f32 .3d; with --camera .png; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
@@ -87,9 +87,8 @@ pub(crate) struct Insert {
     /// seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 15, value_parser = clap::value_parser!(u32).range(0..=86_400))]
     pub(super) patience: u32,
-    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
-    #[arg(long, value_name = "NAMES")]
-    pub(super) columns: Option<Columns>,
+    #[command(flatten)]
+    pub(super) scan_files: ScanFileOptions,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for that of the map or,
     /// with --create, the first point. It is subtracted from them in double precision
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
@@ -127,7 +126,7 @@ impl Insert {
         if self.session.is_some() && self.first_scan_id.is_none() {
             return Err(CliError::usage("--session of scan files needs --first-scan-id"));
         }
-        let files = scan_files(&self.scans)?;
+        let files = self.scan_files.reader().files(&self.scans)?;
         let poses = self.truth.as_ref().map(|path| poses_of_scans(path, &files, &output)).transpose()?;
         let client = self.map.server.connect().await?;
         tell_order(&files, &output)?;
@@ -174,10 +173,8 @@ impl Insert {
         let name = &self.map.name;
         // Who may only insert is not told, and neither is anybody of a map that is not there.
         let there = client.map_info(name).await.ok().map(|info| info.settings);
-        let first = files
-            .first()
-            .map(|file| read_exact_points_by(file, self.columns).map(|points| (file, points)))
-            .transpose()?;
+        let reader = self.scan_files.reader();
+        let first = files.first().map(|file| reader.read(file).map(|points| (file, points))).transpose()?;
         let origin = match (self.origin, &first, there.and_then(|settings| settings.origin)) {
             (None, ..) | (_, None, _) => None,
             (Some(OriginChoice::Auto), _, Some(of_map)) => Some(of_map),
@@ -204,7 +201,7 @@ impl Insert {
         let has_poses = self.truth.is_some() || self.guess.is_some();
         let resolution_m = settings.map_or(RESOLUTION_UNKNOWN_M, |settings| settings.resolution_m);
         let points = first.as_ref().map_or(&[][..], |(_, points)| points);
-        let survey = Survey::of(points, origin, has_poses, resolution_m).with_columns(self.columns);
+        let survey = Survey::of(points, origin, has_poses, resolution_m).with_reader(reader);
         if let Some((file, points)) = &first {
             survey.note_unit(file, points, output);
         }

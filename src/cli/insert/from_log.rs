@@ -72,10 +72,9 @@ impl Insert {
         let given = [
             ("--poses", self.truth.is_some()),
             ("--origin", self.origin.is_some()),
-            ("--columns", self.columns.is_some()),
             ("--first-scan-id", self.first_scan_id.is_some()),
         ];
-        match given.into_iter().find(|(_, is_given)| *is_given) {
+        match given.into_iter().chain(self.scan_files.given()).find(|(_, is_given)| *is_given) {
             Some((option, _)) => Err(CliError::usage(format!("{option}: for scan files, not for a log"))),
             None => Ok(()),
         }

@@ -19,7 +19,7 @@ use mrol_map::align::localize::{
 use mrol_map::geometry::Point;
 use mrol_map::map::{MapName, MapSettings, MultiResolutionMap};
 use mrol_map::mapping::MappingError;
-use mrol_map::scan::{PointFilter, SkippedPoints, scan_files};
+use mrol_map::scan::{PointFilter, SkippedPoints};
 use mrol_map::util::StopSignal;
 use mrol_service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
 use mrol_store::{Disk, Snapshot};
@@ -42,7 +42,7 @@ may be 2 degrees off.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Localize {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32 .3d
+    /// .f32 .3d; with --camera .png
     #[arg(required = true, value_name = "SCAN")]
     scans: Vec<PathBuf>,
     /// A map file, as `mrol map --out` writes it
@@ -85,7 +85,7 @@ pub(crate) struct Localize {
 impl Localize {
     pub(crate) async fn run(self, output: Output) -> Result<(), CliError> {
         let (query, time_limit) = (self.query()?, self.time_limit()?);
-        let files = scan_files(&self.scans)?;
+        let files = self.survey.reader().files(&self.scans)?;
         let place = match (&self.map, &self.name) {
             (Some(file), _) => MapSource::open(file)?,
             (None, Some(name)) => MapSource::Server(self.server.connect().await?, name.clone()),

@@ -9,6 +9,7 @@ use super::run::{KnownPoses, Run, Usable, in_file};
 use crate::cli::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 #[cfg(feature = "logs")]
 use crate::cli::log::LogOptions;
+use crate::cli::scan_file_options::ScanFileOptions;
 use crate::cli::scan_report::{name_of, name_width, tell_order};
 use mrol::console::CliError;
 use mrol::console::Output;
@@ -21,7 +22,7 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapOrigin, MapSettings};
 use mrol_map::mapping::{Guess, SensorAxes, SensorMount};
-use mrol_map::scan::{Columns, PointFilter, read_exact_points_by, scan_files, write_trajectory};
+use mrol_map::scan::{PointFilter, write_trajectory};
 use mrol_store::{Disk, Snapshot};
 
 const EXAMPLES: &str = "\
@@ -31,6 +32,8 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
   mrol map scans/ --resolution 0.1 --poses poses.txt --out hall.mrol      at known poses, without aligning
   mrol map dat/ --resolution 0.1 --poses dat/ --out dat.mrol              scan000.3d with scan000.pose, as 3DTK has them
+  mrol map depth/ --camera \"525 525 319.5 239.5\" --depth-scale 5000 --resolution 0.05 --poses groundtruth.txt
+                                                             depth images and poses, as the RGB-D sets of TUM have them
   mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
                                                              are the filters ample? (last line)
   mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
@@ -51,7 +54,7 @@ when --lookup is given.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Map {
     /// Scan files, or folders of them in the natural order of names (scan2 before scan10): .ply .pcd .xyz .npy .bin
-    /// .f32 .3d; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
+    /// .f32 .3d; with --camera .png; or one log of a robot: .mcap, .db3, or the folder that ros2 bag recorded
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
     /// Side of a finest voxel, meters
@@ -64,7 +67,7 @@ pub(crate) struct Map {
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
     pub(super) first_pose: Option<Pose>,
     /// Which way the sensor's axes point: x ahead, y left, z up (robot), or a camera's, x right, y down, z ahead
-    /// (optical). The first scan is put upright in the map [default: robot]
+    /// (optical). The first scan is put upright in the map [default: robot; of depth images optical]
     #[arg(long, value_parser = parse::keyword::<SensorAxes>(), conflicts_with_all = ["first_pose", "at_truth", "poses"])]
     pub(super) axes: Option<SensorAxes>,
     /// Height of the sensor above the floor: the first scan is put so high above the map's origin [default: 0]
@@ -111,9 +114,8 @@ pub(crate) struct Map {
     /// returned]
     #[arg(long)]
     keep_zeros: bool,
-    /// What the columns of .xyz, .npy, .bin and .f32 files hold, such as "x y z i" [default: x y z, of .bin x y z i]
-    #[arg(long, value_name = "NAMES")]
-    pub(super) columns: Option<Columns>,
+    #[command(flatten)]
+    pub(super) scan_files: ScanFileOptions,
     /// Where the map's origin lies in the coordinates of the scans and poses: "x y z", or auto for the first point. It
     /// is subtracted from them in double precision, and kept in the map
     #[arg(long, value_name = "ORIGIN", allow_hyphen_values = true, value_parser = parse::origin)]
@@ -147,7 +149,7 @@ impl Map {
         if let Some(path) = self.log.path_among(&self.scans)? {
             return self.run_log(path, alignment, filter, output);
         }
-        let files = scan_files(&self.scans)?;
+        let files = self.scan_files.reader().files(&self.scans)?;
         let truth = self.poses_file().map(|path| poses_of_scans(path, &files, &output)).transpose()?;
         self.check_outputs(files.iter().map(PathBuf::as_path))?;
 
@@ -229,20 +231,23 @@ impl Map {
     /// How the scans lie to the map, and the map's origin, if it is to have one.
     fn survey(&self, files: &[PathBuf], output: &Output) -> Result<(Survey, Option<MapOrigin>), CliError> {
         let Some((file, first)) = self.first_with_returns(files)? else {
-            return Ok((Survey::of(&[], None, false, self.resolution).with_columns(self.columns), None));
+            return Ok((
+                Survey::of(&[], None, false, self.resolution).with_reader(self.scan_files.reader()),
+                None,
+            ));
         };
         let origin = self.origin.map(|choice| choice.origin(file, &first)).transpose()?;
         let has_poses = self.first_pose.is_some() || self.at_poses();
         let survey = Survey::of(&first, origin, has_poses, self.resolution);
         survey.note_unit(file, &first, output);
-        Ok((survey.with_columns(self.columns), origin))
+        Ok((survey.with_reader(self.scan_files.reader()), origin))
     }
 
     /// The first file with a point that is a return, and its points.
     fn first_with_returns<'a>(&self, files: &'a [PathBuf]) -> Result<Option<ExactScan<'a>>, CliError> {
         let filter = PointFilter { keep_zeros: self.keep_zeros, ..PointFilter::default() };
         for file in files {
-            let points = read_exact_points_by(file, self.columns)?;
+            let points = self.scan_files.reader().read(file)?;
             if points.iter().any(|point| filter.is_return(Point::from(*point))) {
                 return Ok(Some((file, points)));
             }
@@ -251,7 +256,8 @@ impl Map {
     }
 
     fn mount(&self) -> SensorMount {
-        SensorMount { axes: self.axes.unwrap_or_default(), height_m: self.sensor_height.unwrap_or_default() }
+        let axes = self.axes.or(self.scan_files.camera.map(|_| SensorAxes::Optical));
+        SensorMount { axes: axes.unwrap_or_default(), height_m: self.sensor_height.unwrap_or_default() }
     }
 
     /// The file of poses, whatever they are for.

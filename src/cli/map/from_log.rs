@@ -94,12 +94,9 @@ impl Map {
     }
 
     fn refuse_options_of_files(&self) -> Result<(), CliError> {
-        let given = [
-            ("--truth and --poses", self.poses_file().is_some()),
-            ("--origin", self.origin.is_some()),
-            ("--columns", self.columns.is_some()),
-        ];
-        match given.into_iter().find(|(_, is_given)| *is_given) {
+        let given =
+            [("--truth and --poses", self.poses_file().is_some()), ("--origin", self.origin.is_some())];
+        match given.into_iter().chain(self.scan_files.given()).find(|(_, is_given)| *is_given) {
             Some((option, _)) => Err(CliError::usage(format!("{option}: for scan files, not for a log"))),
             None => Ok(()),
         }

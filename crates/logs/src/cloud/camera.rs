@@ -1,6 +1,7 @@
 //! How a camera projects what it sees: a pinhole.
 
 use crate::message::CameraInfo;
+use mrol_map::scan::Intrinsics;
 
 /// How a camera projects what it sees: a pinhole, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,10 +10,8 @@ pub struct Camera {
     pub height: u32,
     /// Pixels of a row.
     pub width: u32,
-    /// Focal length along a row and along a column.
-    pub focal: [f64; 2],
-    /// Where the axis meets the image: column and row, 0 in the middle of the first pixel.
-    pub center: [f64; 2],
+    /// How a pixel and its depth are a point.
+    pub intrinsics: Intrinsics,
 }
 
 /// Why it is not known how a camera projects what it sees.
@@ -72,6 +71,7 @@ impl Camera {
         if ![x, y].iter().all(|focal| *focal > 0.0 && focal.is_finite()) {
             return Err(NoCamera::Focal(x, y));
         }
-        Ok(Self { height: info.height, width: info.width, focal: [x, y], center: [center_x, center_y] })
+        let intrinsics = Intrinsics { focal: [x, y], center: [center_x, center_y] };
+        Ok(Self { height: info.height, width: info.width, intrinsics })
     }
 }

@@ -81,16 +81,11 @@ impl Cloud {
         check_points(height as usize * width as usize)?;
         let mut points = Vec::with_capacity(height as usize * width as usize);
         for (v, row) in data.chunks(step.max(1) as usize).take(height as usize).enumerate() {
-            let y_at_1_m = (v as f64 - camera.center[1]) / camera.focal[1];
-            for (u, pixel) in row[..row_bytes].chunks_exact(pixel_bytes).enumerate() {
+            let pixels = row[..row_bytes].chunks_exact(pixel_bytes).enumerate();
+            points.extend(pixels.map(|(u, pixel)| {
                 let depth_m = depth.read(pixel, image.is_big_endian);
-                let x_at_1_m = (u as f64 - camera.center[0]) / camera.focal[0];
-                points.push(Point::from(nalgebra::Point3::new(
-                    x_at_1_m * depth_m,
-                    y_at_1_m * depth_m,
-                    depth_m,
-                )));
-            }
+                Point::from(camera.intrinsics.point(u, v, depth_m))
+            }));
         }
         let frame = image.header.frame.to_owned();
         Ok(Self { stamp_ns: image.header.stamp_ns, frame, points, times: None, rings: Vec::new() })

@@ -164,8 +164,11 @@ fn images_that_are_not_as_they_say_are_left_out_in_words() {
     let short = said(&image("16UC1", false, [WIDTH, HEIGHT], |_, _| vec![1]));
     assert!(short.contains("need"), "{short}");
     // Sizes that nothing could hold.
-    let camera =
-        mrol_logs::cloud::Camera { height: u32::MAX, width: u32::MAX, focal: [1.0; 2], center: [0.0; 2] };
+    let camera = mrol_logs::cloud::Camera {
+        height: u32::MAX,
+        width: u32::MAX,
+        intrinsics: mrol_map::scan::Intrinsics { focal: [1.0; 2], center: [0.0; 2] },
+    };
     let mut huge = image("16UC1", false, [1, 1], millimeters);
     // Behind the encapsulation, the stamp, and the frame's name.
     huge[32..40].fill(0xff);

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::supported::{EXTENSIONS, FILE_BYTES_MAX};
+use super::supported::FILE_BYTES_MAX;
 
 /// Longest piece of a file that a message repeats, characters.
 const QUOTE_CHARS_MAX: usize = 80;
@@ -22,12 +22,14 @@ pub enum ReadError {
         cause: io::Error,
     },
     /// No reader knows the file's extension.
-    #[error("{path}: unsupported extension {extension:?}, supported are {}", EXTENSIONS.join(" "))]
+    #[error("{path}: unsupported extension {extension:?}, supported are {}", supported.join(" "))]
     Extension {
         /// The file.
         path: PathBuf,
         /// The file's extension without the dot; empty when it has none.
         extension: String,
+        /// The extensions that are read, with their dots.
+        supported: &'static [&'static str],
     },
     /// The file is larger than a scan may be.
     #[error("{path}: larger than {FILE_BYTES_MAX} bytes, the most a scan file may have; split it")]
@@ -44,10 +46,12 @@ pub enum ReadError {
         what: &'static str,
     },
     /// A directory has no scan file.
-    #[error("{path}: no scan file in this directory, supported are {}", EXTENSIONS.join(" "))]
+    #[error("{path}: no scan file in this directory, supported are {}", supported.join(" "))]
     Empty {
         /// The directory.
         path: PathBuf,
+        /// The extensions that are read, with their dots.
+        supported: &'static [&'static str],
     },
     /// A line of text could not be understood.
     #[error("{path}:{line}: {problem}")]

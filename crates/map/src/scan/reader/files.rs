@@ -9,9 +9,9 @@ use nalgebra::Point3;
 use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::ReadError;
-use super::format::Format;
+use super::format::{Format, extension};
 use super::natural::compare_names;
-use super::supported::FILE_BYTES_MAX;
+use super::supported::{EXTENSIONS, FILE_BYTES_MAX};
 use crate::geometry::Point;
 
 /// The points of the scan file at `path`, in the sensor frame, meters.
@@ -70,13 +70,24 @@ pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> 
 /// When a path does not exist, a file has an extension that [`read_points`] does not know or is none (a named pipe), a
 /// directory cannot be read, or a directory has no scan file.
 pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
+    scan_files_of(paths, &EXTENSIONS)
+}
+
+/// [`scan_files`] whose formats are those of `extensions`, each with its dot, in lower case.
+///
+/// # Errors
+/// As [`scan_files`], for these extensions.
+pub fn scan_files_of(
+    paths: &[PathBuf],
+    extensions: &'static [&'static str],
+) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for path in paths {
         let metadata = fs::metadata(path).map_err(ReadError::io(path))?;
         if metadata.is_dir() {
-            files.extend(files_of_directory(path)?);
+            files.extend(files_of_directory(path, extensions)?);
         } else {
-            Format::named_by(path)?;
+            check_extension(path, extensions)?;
             check_regular(path, &metadata)?;
             files.push(path.clone());
         }
@@ -84,16 +95,28 @@ pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
     Ok(files)
 }
 
-fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
+/// Refuses a file with another extension than those.
+fn check_extension(path: &Path, extensions: &'static [&'static str]) -> Result<(), ReadError> {
+    let extension = extension(path);
+    match extensions.iter().any(|known| known[1..] == extension) {
+        true => Ok(()),
+        false => Err(ReadError::Extension { path: path.to_owned(), extension, supported: extensions }),
+    }
+}
+
+fn files_of_directory(
+    directory: &Path,
+    extensions: &'static [&'static str],
+) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for entry in fs::read_dir(directory).map_err(ReadError::io(directory))? {
         let path = entry.map_err(ReadError::io(directory))?.path();
-        if Format::of(&path).is_some() && path.is_file() {
+        if check_extension(&path, extensions).is_ok() && path.is_file() {
             files.push(path);
         }
     }
     if files.is_empty() {
-        return Err(ReadError::Empty { path: directory.to_owned() });
+        return Err(ReadError::Empty { path: directory.to_owned(), supported: extensions });
     }
     files.sort_by(|a, b| compare_names(a, b));
     Ok(files)

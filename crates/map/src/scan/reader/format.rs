@@ -5,10 +5,11 @@ use std::path::Path;
 use super::columns::Columns;
 use super::coordinates::Coordinates;
 use super::error::{Problem, ReadError};
+use super::supported::EXTENSIONS;
 use super::{bare, npy, pcd, ply, text, uos};
 
 /// The extension of `path` without its dot, in lower case.
-fn extension(path: &Path) -> String {
+pub(super) fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
@@ -27,12 +28,17 @@ pub(super) enum Format {
 
 impl Format {
     pub(super) fn named_by(path: &Path) -> Result<Self, ReadError> {
-        let unknown = || ReadError::Extension { path: path.to_owned(), extension: extension(path) };
-        Self::of(path).ok_or_else(unknown)
+        let extension = extension(path);
+        let format = Self::of_extension(&extension);
+        format.ok_or_else(|| ReadError::Extension {
+            path: path.to_owned(),
+            extension,
+            supported: &EXTENSIONS,
+        })
     }
 
-    pub(super) fn of(path: &Path) -> Option<Self> {
-        match extension(path).as_str() {
+    fn of_extension(extension: &str) -> Option<Self> {
+        match extension {
             "ply" => Some(Self::Ply),
             "pcd" => Some(Self::Pcd),
             "xyz" => Some(Self::Xyz),

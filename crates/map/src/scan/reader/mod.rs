@@ -29,7 +29,9 @@ pub use columns::{Columns, ColumnsError};
 pub(super) use error::Problem;
 pub use error::ReadError;
 pub(super) use files::read_file;
-pub use files::{parse_points, read_exact_points, read_exact_points_by, read_points, scan_files};
+pub use files::{
+    parse_points, read_exact_points, read_exact_points_by, read_points, scan_files, scan_files_of,
+};
 pub(super) use lines::content_lines;
 pub use natural::compare_names;
 pub(super) use text::number;

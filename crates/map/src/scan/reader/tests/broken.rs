@@ -13,7 +13,7 @@ use crate::scan::reader::supported::EXTENSIONS;
 #[test]
 fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {
     for (extension, bytes) in every_format() {
-        let format = Format::of(Path::new(&format!("a.{extension}"))).unwrap();
+        let format = Format::named_by(Path::new(&format!("a.{extension}"))).unwrap();
         for end in 0..bytes.len() {
             if let Ok(points) = format.points::<Point>(&bytes[..end], None) {
                 let declared = matches!(format, Format::Ply | Format::Pcd | Format::Npy);
@@ -29,7 +29,7 @@ fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {
 fn garbage_in_any_place_never_panics() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for (extension, bytes) in every_format() {
-        let format = Format::of(Path::new(&format!("a.{extension}"))).unwrap();
+        let format = Format::named_by(Path::new(&format!("a.{extension}"))).unwrap();
         for _ in 0..2000 {
             let mut broken = bytes.clone();
             // Mostly in the header, where a byte does most harm.
@@ -51,7 +51,7 @@ fn garbage(rng: &mut ChaCha8Rng) -> u8 {
 fn bytes_of_no_format_never_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for extension in EXTENSIONS {
-        let format = Format::of(Path::new(&format!("a{extension}"))).unwrap();
+        let format = Format::named_by(Path::new(&format!("a{extension}"))).unwrap();
         for length in 0..500 {
             let bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
             let _ = format.points::<Point>(&bytes, None);

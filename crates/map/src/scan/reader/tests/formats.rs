@@ -31,7 +31,7 @@ fn an_unsupported_extension_lists_the_supported_ones() {
     let error = read("las", b"").unwrap_err().to_string();
     assert!(error.contains("\"las\"") && error.contains(".ply .pcd .xyz .npy .bin .f32 .3d"), "{error}");
     assert!(matches!(read_points(Path::new("scan")), Err(ReadError::Extension { .. })));
-    assert_eq!(Format::of(Path::new("SCAN.PLY")), Some(Format::Ply));
+    assert_eq!(Format::named_by(Path::new("SCAN.PLY")).unwrap(), Format::Ply);
 }
 
 #[test]
