@@ -133,6 +133,12 @@ fn a_log_becomes_a_map_and_the_same_one_on_a_server() {
     let rest = objects(&part);
     assert_eq!((first.len(), rest.len()), (3, 2));
     assert_eq!(rest[1]["map_from_sensor"], there[4]["map_from_sensor"]);
+    // From the middle of the log on a map begins where the odometry is.
+    let late = [&insert[..3], &["d"], &insert[4..], &["--create", "--from", "0.2"], &SETTINGS].concat();
+    let here = objects(&[&["map", &log.path, "--from", "0.2"], &SETTINGS[..]].concat());
+    let place = &here[0]["map_from_sensor"];
+    assert_eq!(objects(&late)[0]["map_from_sensor"], *place);
+    assert!(place["translation_m"][0].as_f64().unwrap() > 0.05, "{place}");
     // As fast as it was recorded: never faster, and the same map.
     let played = [&insert[..3], &["c"], &insert[4..], &["--create", "--real-time"], &SETTINGS].concat();
     let begin = Instant::now();

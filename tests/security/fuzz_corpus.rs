@@ -58,4 +58,4 @@ macro_rules! replayed {
     };
 }
 
-replayed!(journal record map_file ply pcd text log octree arrays config keys grpc http);
+replayed!(journal record map_file ply pcd text log octree arrays las e57 depth_image config keys grpc http);

@@ -33,10 +33,13 @@ impl Insert {
         };
         let client = self.map.server.connect().await?;
         self.survey(&client, &[], &output).await?;
+        // Who may only insert is not told.
+        let begins_map = client.map_info(&self.map.name).await.is_ok_and(|info| info.is_empty());
         let mut sending = LogSending {
             insert: self,
             client: &client,
             path,
+            begins_map,
             done_ns: self.last_inserted_ns(&client, &session).await,
             session,
             odometer: Odometer::default(),
@@ -100,6 +103,8 @@ struct LogSending<'a> {
     insert: &'a Insert,
     client: &'a Client,
     path: &'a Path,
+    /// True where the map was empty before the log's first scan.
+    begins_map: bool,
     session: SessionName,
     /// Scans up to the one of this stamp, in the order of the log, were sent by an earlier start of the command; none
     /// once it was met.
@@ -159,7 +164,8 @@ impl LogSending<'_> {
         let insert = self.insert;
         let told = insert.guess.filter(|_| is_first).map(Guess::Pose);
         let next = insert.next_guess.unwrap_or(GuessName::ConstantVelocity).into();
-        let guess = told.or_else(|| self.odometer.guess(scan));
+        let first = || scan.first_pose().filter(|_| is_first && self.begins_map).map(Guess::Pose);
+        let guess = told.or_else(|| self.odometer.guess(scan)).or_else(first);
         let points = std::mem::take(&mut scan.points);
         let times_s = scan.times_s.take();
         Ok(ScanRequest {

@@ -10,14 +10,11 @@ use mrol::console::{CliError, Output, Survey};
 use mrol::offline::KnownScan;
 use mrol_logs::sequence::{LoggedScan, Odometer};
 use mrol_map::align::AlignmentSettings;
-use mrol_map::geometry::Pose;
 use mrol_map::mapping::Guess;
 use mrol_map::scan::{PointFilter, UnitDoubt};
 
 /// Characters of a scan's name: a stamp of this century, in milliseconds.
 const NAME_WIDTH: usize = 14;
-/// A first pose by odometry that is farther from the origin is not taken, meters: those of satellites are.
-const FIRST_POSE_MAX_M: f64 = 1000.0;
 
 impl Map {
     /// Maps the clouds of a log.
@@ -85,12 +82,10 @@ impl Map {
         self.finish(&mapper, run, &output)
     }
 
-    /// Where the first scan was taken by the odometry, in whose frame the map then lies; none where options say it, or
-    /// the odometry is far from its origin.
+    /// Where the first scan was taken by the odometry, in whose frame the map then lies; none where options say it.
     fn first_guess(&self, scan: &LoggedScan) -> Option<Guess> {
         let is_told = self.axes.is_some() || self.sensor_height.is_some();
-        let is_near = |pose: &Pose| pose.translation.vector.norm() <= FIRST_POSE_MAX_M;
-        scan.odometry_from_sensor.filter(|pose| !is_told && is_near(pose)).map(Guess::Pose)
+        scan.first_pose().filter(|_| !is_told).map(Guess::Pose)
     }
 
     fn refuse_options_of_files(&self) -> Result<(), CliError> {

@@ -12,12 +12,13 @@ mod scan_files;
 #[path = "../../support/simulated_disk.rs"]
 #[allow(dead_code, unreachable_pub, reason = "it is used in part")]
 mod simulated;
+mod surveys;
 
 /// A function that is fuzzed.
 pub type Target = fn(&[u8]);
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 12] = [
     ("journal", journal::journal),
     ("record", record::record),
     ("map_file", map_file::map_file),
@@ -27,6 +28,9 @@ pub const TARGETS: [(&str, Target); 9] = [
     ("log", log::log),
     ("octree", map_files::octree),
     ("arrays", map_files::arrays),
+    ("las", surveys::las),
+    ("e57", surveys::e57),
+    ("depth_image", surveys::depth_image),
 ];
 
 /// Calls the target of that name.

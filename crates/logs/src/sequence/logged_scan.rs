@@ -18,3 +18,14 @@ pub struct LoggedScan {
     /// Direction of gravity in the sensor frame, while the accelerometer reads 1 g.
     pub gravity: Option<Gravity>,
 }
+
+/// A first pose by odometry that is farther from the origin is not taken, meters: those of satellites are.
+const FIRST_POSE_MAX_M: f64 = 1000.0;
+
+impl LoggedScan {
+    /// Where a map that begins with this scan has it, so that the map lies as the odometry's frame: by the odometry;
+    /// none far from its origin.
+    pub fn first_pose(&self) -> Option<Pose> {
+        self.odometry_from_sensor.filter(|pose| pose.translation.vector.norm() <= FIRST_POSE_MAX_M)
+    }
+}

@@ -57,6 +57,13 @@ impl<'a> Scan<'a> {
         RayEnds { points: self.points, times_s: self.times_s }.at(velocity)
     }
 
+    /// How far a point lies, at most, from where it is with another velocity, meters.
+    pub(super) fn points_moved_m(&self, velocity: Option<&Twist>, other: Option<&Twist>) -> f64 {
+        let [points, others] = [velocity, other].map(|velocity| self.points_at(velocity));
+        let moved_m = points.iter().zip(&*others).map(|(a, b)| (a.to_f64() - b.to_f64()).norm());
+        moved_m.fold(0.0, f64::max)
+    }
+
     /// [`Scan::points_at`], and where rays ended at the robot itself: all that stood in the way of one.
     pub(super) fn met_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
         let mut met = self.points_at(velocity);

@@ -23,6 +23,9 @@ use crate::visibility::ScanRays;
 
 /// A scan that was found farther from its guess than this leaves a viewpoint, meters: the next ones come from there.
 const FAR_M: f64 = 1.0;
+/// A scan is aligned again where the motion that was found moves one of its points by more than this share of a finest
+/// voxel: less moves its pose by less than it is known to.
+const SHARPER: f64 = 1.0 / 32.0;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
@@ -110,7 +113,7 @@ impl<'a> ScanMapper<'a> {
     /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every
     /// other one is aligned from its guess, or only judged there where the caller wants it at its guess. Points with
     /// times are deskewed: first by the motion that the guess tells, then, once the alignment has found the pose, by
-    /// the motion to that, and aligned again.
+    /// the motion to that, and aligned again where that moves them.
     ///
     /// # Errors
     /// The guess needs a pose that is not there, or `stop` said so.
@@ -130,12 +133,14 @@ impl<'a> ScanMapper<'a> {
         };
         if scan.times_s.is_some() && !scan.at_guess && alignment.verdict == Verdict::Accepted {
             let found = self.velocity(scan, &alignment.map_from_sensor);
-            if found.is_some() && found != velocity {
+            let moved_m = scan.points_moved_m(velocity.as_ref(), found.as_ref());
+            let is_sharper = found.is_some() && moved_m > SHARPER * map.settings().resolution_m;
+            if is_sharper {
                 let wants_more_starts = alignment.wants_more_starts;
                 alignment = self.align(scan, found.as_ref(), &alignment.map_from_sensor, stop);
                 alignment.wants_more_starts |= wants_more_starts;
-                velocity = found;
             }
+            velocity = found.or(velocity);
         }
         if stop.is_stopped() {
             return Err(MappingError::Stopped);

@@ -59,6 +59,13 @@ pub struct MapInfo {
     pub is_asleep: bool,
 }
 
+impl MapInfo {
+    /// True of a map without a voxel.
+    pub fn is_empty(&self) -> bool {
+        self.levels.first().is_none_or(|finest| finest.voxels == 0)
+    }
+}
+
 /// How many maps are in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MapsAwake {
