@@ -24,7 +24,7 @@ pub use truth::{poses_of_scans, true_poses};
 
 pub use self::credentials::CredentialOptions;
 pub use self::error::CliError;
-pub use self::new_file::{NewFile, check_is_map_file, check_is_no_input};
+pub use self::new_file::{NewFile, check_is_no_input, place_of_map_file};
 pub use self::output::Output;
 pub use self::plan::{PlanLayer, plan};
 pub use self::points::points_of;

@@ -87,17 +87,20 @@ pub fn check_is_no_input<'a>(out: &Path, inputs: impl IntoIterator<Item = &'a Pa
     }
 }
 
-/// Checks that the name of a map file says that it is one, so that none replaces a file of another kind.
+/// Where a map file is to be that the user wants at `out`: the end of a link.
 ///
 /// # Errors
-/// Names the file.
-pub fn check_is_map_file(out: &Path) -> Result<(), CliError> {
-    let is_map = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mrol"));
-    match is_map || fs::metadata(out).is_ok_and(|there| !there.is_file()) {
-        true => Ok(()),
-        false => {
-            Err(CliError::usage(format!("--out: a map file's name must end in .mrol, got {}", out.display())))
-        }
+/// When its name does not say that it is a map file, so that none replaces a file of another kind, or something else
+/// than a file is there: a map file is put in the place of what is there.
+pub fn place_of_map_file(out: &Path) -> Result<PathBuf, CliError> {
+    let named = out.display();
+    if !out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mrol")) {
+        return Err(CliError::usage(format!("--out: a map file's name must end in .mrol, got {named}")));
+    }
+    let place = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    match fs::metadata(&place).is_ok_and(|there| !there.is_file()) {
+        true => Err(CliError::usage(format!("--out: {named} is no regular file, which a map file replaces"))),
+        false => Ok(place),
     }
 }
 
@@ -135,8 +138,25 @@ mod tests {
         let error = check_is_no_input(&other, [path("b.ply").as_path(), &read]).unwrap_err();
         assert!(error.to_string().contains("would be replaced"), "{error}");
         check_is_no_input(&path("new.ply"), [read.as_path()]).unwrap();
-        check_is_map_file(&path("new.mrol")).unwrap();
-        check_is_map_file(Path::new("/dev/null")).unwrap();
-        assert!(check_is_map_file(&read).unwrap_err().to_string().contains("must end in .mrol"));
+        assert_eq!(place_of_map_file(&path("new.mrol")).unwrap(), path("new.mrol"));
+        for none in [Path::new("/dev/null"), &read] {
+            assert!(place_of_map_file(none).unwrap_err().to_string().contains("must end in .mrol"));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_map_file_takes_the_place_of_a_file_and_of_the_end_of_a_link_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("real.mrol"), "").unwrap();
+        std::os::unix::fs::symlink("real.mrol", path("link.mrol")).unwrap();
+        std::os::unix::fs::symlink("/dev/null", path("null.mrol")).unwrap();
+        assert_eq!(
+            place_of_map_file(&path("link.mrol")).unwrap(),
+            fs::canonicalize(path("real.mrol")).unwrap()
+        );
+        let refused = place_of_map_file(&path("null.mrol")).unwrap_err().to_string();
+        assert!(refused.contains("null.mrol is no regular file"), "{refused}");
     }
 }

@@ -12,22 +12,63 @@ const NUMBER_MAX: f64 = 1e6;
 
 /// How far apart in time two lines may be that a pose is taken between.
 const APART_MAX_S: f64 = 0.2;
+/// Times beyond this are no seconds since 1970: the year 5138.
+const TIME_MAX_S: f64 = 1e11;
+/// Digits of a number in a name that is a time: seconds since 1970 have ten.
+const TIME_DIGITS: usize = 9;
 
-/// True of a time in seconds, and not of the number of a scan.
-fn is_time(number: f64) -> bool {
-    number.is_finite() && (number.fract() != 0.0 || number >= NUMBER_MAX)
+/// What the name of a scan says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum NameOfScan {
+    /// A whole number.
+    Number,
+    /// A time, seconds.
+    Time(f64),
+    /// Something with digits in it as a time has.
+    LikeTime,
+    Other,
 }
 
-/// The times that files are named by, seconds; none where a name is none.
-fn times_of(files: &[PathBuf]) -> Option<Vec<f64>> {
-    let time = |file: &PathBuf| file.file_stem()?.to_str()?.parse().ok().filter(|&time| is_time(time));
-    files.iter().map(time).collect()
+impl NameOfScan {
+    fn of(file: &Path) -> Self {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let is_digits = stem.bytes().all(|byte| byte.is_ascii_digit());
+        match stem.parse::<f64>().ok().filter(|number| number.is_finite()) {
+            Some(number) if is_digits && number < NUMBER_MAX => Self::Number,
+            Some(time_s) => Self::Time(time_s),
+            None if stem.split(|c: char| !c.is_ascii_digit()).any(|digits| digits.len() >= TIME_DIGITS) => {
+                Self::LikeTime
+            }
+            None => Self::Other,
+        }
+    }
+}
+
+/// The times that scans are named by, seconds; none where they are numbered or named otherwise.
+///
+/// # Errors
+/// Names a file that is no time among times.
+fn times_of(files: &[PathBuf]) -> Result<Option<Vec<f64>>, &Path> {
+    let names: Vec<NameOfScan> = files.iter().map(|file| NameOfScan::of(file)).collect();
+    if !names.iter().any(|name| matches!(name, NameOfScan::Time(_) | NameOfScan::LikeTime)) {
+        return Ok(None);
+    }
+    let times = files.iter().zip(names).map(|(file, name)| match name {
+        NameOfScan::Time(time_s) => Ok(time_s),
+        _ => Err(file.as_path()),
+    });
+    times.collect::<Result<_, _>>().map(Some)
+}
+
+/// True of lines that are numbered, as those of a trajectory of this program.
+fn are_numbered(poses: &[StampedPose]) -> bool {
+    poses.iter().all(|pose| pose.id.fract() == 0.0 && (0.0..NUMBER_MAX).contains(&pose.id))
 }
 
 /// Where the numbers of lines do not go on by one, as those of a trajectory without its refused scans; none where they
 /// are times.
 fn gap_of(poses: &[StampedPose]) -> Option<[f64; 2]> {
-    if !poses.iter().all(|pose| pose.id.fract() == 0.0 && (0.0..NUMBER_MAX).contains(&pose.id)) {
+    if !are_numbered(poses) {
         return None;
     }
     let pairs = poses.windows(2).map(|pair| [pair[0].id, pair[1].id]);
@@ -44,10 +85,7 @@ fn gap_of(poses: &[StampedPose]) -> Option<[f64; 2]> {
 /// When there is not a pose for each scan, or a file cannot be read.
 pub fn poses_of_scans(path: &Path, files: &[PathBuf], output: &Output) -> Result<Vec<Pose>, CliError> {
     if !path.is_dir() {
-        return match times_of(files) {
-            Some(times_s) => poses_at(path, files, &times_s, output),
-            None => true_poses(path, files.len(), output),
-        };
+        return poses_of_file(path, files, output);
     }
     let beside = |file: &PathBuf| path.join(file.file_name().unwrap_or_default()).with_extension("pose");
     if let Some(file) = files.first().filter(|file| !beside(file).exists()) {
@@ -61,20 +99,56 @@ pub fn poses_of_scans(path: &Path, files: &[PathBuf], output: &Output) -> Result
     Ok(files.iter().map(|file| read_uos_pose(&beside(file))).collect::<Result<_, _>>()?)
 }
 
-/// The poses of scans that were taken at `times_s`: between two lines where these are times too, else line k of scan k.
-fn poses_at(path: &Path, files: &[PathBuf], times_s: &[f64], output: &Output) -> Result<Vec<Pose>, CliError> {
-    let (mut stamped, form) = read_poses(path)?;
-    if stamped.is_empty() || !stamped.iter().all(|pose| is_time(pose.id)) {
+/// The poses of a file: at the times that the scans are named by, where its lines are times too, else line k for scan
+/// k.
+fn poses_of_file(path: &Path, files: &[PathBuf], output: &Output) -> Result<Vec<Pose>, CliError> {
+    let (stamped, form) = read_poses(path)?;
+    if form != PoseForm::Tum || are_numbered(&stamped) {
         return poses_in_order(path, (stamped, form), files.len(), output);
     }
+    match times_of(files) {
+        Ok(Some(times_s)) => poses_at(path, stamped, files, &times_s, output),
+        // As many lines as scans are theirs, whatever these are called.
+        Err(file) if stamped.len() != files.len() => Err(CliError::failed(format!(
+            "{}: its {} lines are times, and there are {} scans, of which {} is not named by a time in seconds: name \
+             each as 1305031102.160407, or give a line a scan",
+            path.display(),
+            stamped.len(),
+            files.len(),
+            file.display()
+        ))),
+        Ok(None) | Err(_) => poses_in_order(path, (stamped, form), files.len(), output),
+    }
+}
+
+/// The poses of scans that were taken at `times_s`, each between two lines.
+fn poses_at(
+    path: &Path,
+    mut stamped: Vec<StampedPose>,
+    files: &[PathBuf],
+    times_s: &[f64],
+    output: &Output,
+) -> Result<Vec<Pose>, CliError> {
+    let named = path.display();
+    let times = stamped.iter().map(|pose| pose.id).chain(times_s.iter().copied());
+    if let Some(time) = times.into_iter().find(|time| time.abs() > TIME_MAX_S) {
+        return Err(CliError::failed(format!(
+            "{named}: lines and names of scans are taken as times in seconds, and one is {time}: is it in nanoseconds?"
+        )));
+    }
     stamped.sort_by(|a, b| a.id.total_cmp(&b.id));
-    output.note(format!("{}: the poses at the times that the scans are named by", path.display()));
+    let is_twofold = |pair: &&[StampedPose]| {
+        pair[0].id == pair[1].id && pair[0].map_from_sensor != pair[1].map_from_sensor
+    };
+    if let Some(pair) = stamped.windows(2).find(is_twofold) {
+        return Err(CliError::failed(format!("{named}: two lines have different poses at {} s", pair[0].id)));
+    }
+    output.note(format!("{named}: the poses at the times that the scans are named by"));
     let pose = |(file, &time_s): (&PathBuf, &f64)| {
         between(&stamped, time_s).ok_or_else(|| {
             CliError::failed(format!(
-                "{}: no pose for {}: its name is a time, {time_s} s, with no two lines around it that are at most \
+                "{named}: no pose for {}: its name is the time {time_s} s, with no two lines around it that are at most \
                  {APART_MAX_S} s apart; leave it out",
-                path.display(),
                 file.display()
             ))
         })
@@ -122,6 +196,11 @@ fn poses_in_order(
              for scan k"
         ));
     }
+    if !are_numbered(&stamped) && !stamped.is_sorted_by(|a, b| a.id <= b.id) {
+        output.note(format!(
+            "{file}: the times of its lines do not rise: poses are taken in order, line k for scan k"
+        ));
+    }
     let mut poses: Vec<Pose> = stamped.iter().map(|pose| pose.map_from_sensor).collect();
     if count < scans {
         let message = format!("{file}: {count} poses for {scans} scans: there must be a line a scan");
@@ -149,13 +228,53 @@ mod tests {
     }
 
     #[test]
-    fn names_are_times_where_all_are() {
-        let files = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
-        let times = times_of(&files(&["d/1305031102.160407.png", "d/1305031103.png"]));
-        assert_eq!(times, Some(vec![1_305_031_102.160_407, 1_305_031_103.0]));
-        for none in [&["d/7.png"][..], &["d/1305031102.160407.png", "d/0.png"], &["d/a.png"], &["d/nan.png"]]
-        {
-            assert_eq!(times_of(&files(none)), None, "{none:?}");
+    fn names_are_times_or_numbers_or_neither() {
+        let files = |names: &[&str]| {
+            names.iter().map(|name| PathBuf::from(format!("d/{name}.png"))).collect::<Vec<_>>()
+        };
+        let times = |names: &[&str]| times_of(&files(names)).map_err(Path::to_owned);
+        assert_eq!(
+            times(&["1305031102.160407", "1305031103"]),
+            Ok(Some(vec![1_305_031_102.160_407, 1_305_031_103.0]))
+        );
+        assert_eq!(times(&["0.000000", "0.100000"]), Ok(Some(vec![0.0, 0.1])));
+        for numbered in [&["7"][..], &["0000", "0001"], &["scan7", "a"], &["nan"], &[]] {
+            assert_eq!(times(numbered), Ok(None), "{numbered:?}");
+        }
+        for (names, which) in [
+            (&["10.05", "avg"][..], "avg"),
+            (&["depth_1305031102.16"], "depth_1305031102.16"),
+            (&["1305031102,16", "1305031102,26"], "1305031102,16"),
+            (&["1305031102.16", "7"], "7"),
+        ] {
+            assert_eq!(times(names), Err(PathBuf::from(format!("d/{which}.png"))), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_matched_by_time_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("poses.txt");
+        let output = Output::new(false);
+        let poses = |ids: &[f64], names: &[&str]| {
+            let line = |(k, id): (usize, &f64)| format!("{id} {k} 0 0 0 0 0 1\n");
+            std::fs::write(&path, ids.iter().enumerate().map(line).collect::<String>()).unwrap();
+            let files: Vec<PathBuf> = names.iter().map(|name| PathBuf::from(format!("{name}.png"))).collect();
+            let poses = poses_of_scans(&path, &files, &output).map_err(|error| error.to_string())?;
+            Ok::<_, String>(poses.iter().map(|pose| pose.translation.x).collect::<Vec<_>>())
+        };
+        // A time may be whole, and one line may be of the clock's beginning.
+        assert_eq!(poses(&[9.9, 10.0, 10.1, 0.0], &["9.95", "10.0"]).unwrap().len(), 2);
+        assert_eq!(poses(&[0.0, 0.1, 0.2], &["0.000000", "0.200000"]), Ok(vec![0.0, 2.0]));
+        assert_eq!(poses(&[0.0, 1.0, 2.0], &["0", "1", "2"]), Ok(vec![0.0, 1.0, 2.0]));
+        for (ids, names, told) in [
+            (&[9.9, 10.0, 10.1][..], &["10.05", "avg"][..], "avg.png is not named by a time"),
+            (&[9.9, 10.0, 10.1], &["depth_1305031102.16"], "is not named by a time"),
+            (&[9.9, 10.0, 10.0, 10.1], &["9.95"], "two lines have different poses at 10 s"),
+            (&[1.3e18, 1.4e18], &["1305031102160000000"], "in nanoseconds?"),
+        ] {
+            let refused = poses(ids, names).unwrap_err();
+            assert!(refused.contains(told), "{refused}");
         }
     }
 

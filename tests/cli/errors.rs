@@ -103,6 +103,17 @@ fn what_is_no_regular_file_is_refused_and_not_waited_for() {
     };
     refused(&["map", &path, pipe, "--resolution", "0.1"]);
     refused(&["insert", pipe, "--map", "a", "--server", "http://127.0.0.1:9"]);
+    for survey in ["a.las", "a.laz", "a.e57", "a.png"] {
+        let pipe = folder.path().join(survey);
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let out = folder.path().join("a.mrol");
+        let (pipe, out) = (pipe.to_str().unwrap(), out.to_str().unwrap());
+        let said = match survey {
+            "a.png" => complaint(&["map", pipe, "--resolution", "0.1", "--camera", "9 9 1 1"], 1),
+            _ => complaint(&["import", pipe, "--resolution", "0.1", "--out", out], 1),
+        };
+        assert!(said.contains(survey) && said.contains("write it to"), "{said}");
+    }
     let device = folder.path().join("null.xyz");
     std::os::unix::fs::symlink("/dev/null", &device).unwrap();
     let said = complaint(&["map", device.to_str().unwrap(), "--resolution", "0.1"], 1);

@@ -84,6 +84,12 @@ fn a_folder_without_the_pose_of_a_scan_says_what_is_missing() {
     let map =
         |scans: &str| complaint(&["map", scans, "--resolution", "0.1", "--poses", &converted.path("")], 1);
     assert!(map(&sequence.path("scans")).contains("there is no 0000.pose"));
+    // Poses that are read are not replaced by those that are found.
+    let pose = converted.path("scan000.pose");
+    let dat = converted.path("");
+    let said =
+        complaint(&["map", &dat, "--resolution", "0.1", "--poses", &dat, "--trajectory-out", &pose], 2);
+    assert!(said.contains("scan000.pose") && said.contains("would be replaced"), "{said}");
     fs::remove_file(converted.path("scan001.pose")).unwrap();
     assert!(map(&converted.path("")).contains("scan001.pose: "));
 }

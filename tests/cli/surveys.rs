@@ -100,3 +100,15 @@ fn scans_of_an_e57_go_in_at_their_poses_with_viewpoints() {
     let (voxels, of_scans) = (points.voxels.len(), snapshot.contents.voxels.len());
     assert!(voxels.abs_diff(of_scans) * 10 <= of_scans, "{voxels} {of_scans}");
 }
+
+#[test]
+fn a_survey_in_millimeters_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let lines = (0..200).map(|k| format!("{} {} {}\n", 5000 + k * 13, k * 7 - 900, k % 17 * 100));
+    std::fs::write(path("room.xyz"), lines.collect::<String>()).unwrap();
+    let said =
+        mrol(&["import", &path("room.xyz"), "--resolution", "1", "--out", &path("a.mrol")]).output().unwrap();
+    let noted = String::from_utf8_lossy(&said.stderr);
+    assert!(said.status.success() && noted.contains("in millimeters?"), "{noted}");
+}

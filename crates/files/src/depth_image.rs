@@ -1,16 +1,16 @@
 //! Depth images as PNG files, as the RGB-D sets of TUM and ICL-NUIM have them: a scan each.
 
-use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
 use nalgebra::Point3;
 use png::{BitDepth, ColorType, DecodingError};
 
+use crate::regular_file::open_regular;
 use mrol_map::scan::Intrinsics;
 
-/// Most pixels of an image: 4096 x 4096.
-const PIXELS_MAX: u64 = 1 << 24;
+/// Most pixels of an image, more than 3840 x 2160.
+const PIXELS_MAX: u64 = 1 << 23;
 /// Bytes of a pixel.
 const PIXEL_BYTES: usize = 2;
 /// Most bytes that the decoder may hold beside the image: a few rows.
@@ -44,6 +44,20 @@ pub enum DepthImageError {
         /// Bits of a channel.
         bits: u8,
     },
+    /// The image is not one of this camera.
+    #[error(
+        "an image of {width} x {height} pixels, and the camera's axis meets it at {:?}, outside of it: are these the \
+         intrinsics of images of this size?",
+        center
+    )]
+    OtherCamera {
+        /// Pixels of a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Column and row where the axis meets the image.
+        center: [f64; 2],
+    },
     /// The image is larger than a camera's.
     #[error("{width} x {height} pixels, at most {PIXELS_MAX} are read")]
     TooLarge {
@@ -56,14 +70,14 @@ pub enum DepthImageError {
 
 impl DepthImages {
     /// What the pixels of the PNG file at `path` met, row by row, in the camera's frame (x right, y down, z ahead),
-    /// meters. Depths are along z; a depth of 0 says that there is none, and gives the point 0 0 0, which says that nothing
-    /// returned.
+    /// meters. Depths are along z; a depth of 0 says that there is none, and gives the point 0 0 0, which says that
+    /// nothing returned.
     ///
     /// # Errors
     /// When the file cannot be read, is damaged, is too large, or has no depths.
     pub fn read(&self, path: &Path) -> Result<Vec<Point3<f64>>, DepthImageError> {
         let limits = png::Limits { bytes: DECODER_BYTES_MAX };
-        let decoder = png::Decoder::new_with_limits(BufReader::new(File::open(path)?), limits);
+        let decoder = png::Decoder::new_with_limits(BufReader::new(open_regular(path)?.0), limits);
         let mut image = decoder.read_info()?;
         let (color, depth) = image.output_color_type();
         if (color, depth) != (ColorType::Grayscale, BitDepth::Sixteen) {
@@ -72,6 +86,9 @@ impl DepthImages {
         let (width, height) = image.info().size();
         if u64::from(width) * u64::from(height) > PIXELS_MAX {
             return Err(DepthImageError::TooLarge { width, height });
+        }
+        if !self.intrinsics.fits([width, height]) {
+            return Err(DepthImageError::OtherCamera { width, height, center: self.intrinsics.center });
         }
         let mut bytes = vec![0; width as usize * height as usize * PIXEL_BYTES];
         image.next_frame(&mut bytes)?;
@@ -145,8 +162,14 @@ mod tests {
         assert!(shades.contains("1 of 8"), "{shades}");
         assert!(refused(b"").contains("no PNG"), "{}", refused(b""));
         assert!(refused(b"ply\n").contains("no PNG"));
-        let large = written(ColorType::Grayscale, BitDepth::Sixteen, [8192, 4096], &vec![0; 8192 * 4096 * 2]);
-        assert!(refused(&large).contains("8192 x 4096 pixels, at most 16777216"));
+        let large = written(ColorType::Grayscale, BitDepth::Sixteen, [4096, 2049], &vec![0; 4096 * 2049 * 2]);
+        let other = DepthImages { intrinsics: Intrinsics { focal: [525.0; 2], center: [319.5, 1.0] }, ..TUM };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("depth.png");
+        std::fs::write(&path, three_by_two()).unwrap();
+        let told = other.read(&path).unwrap_err().to_string();
+        assert!(told.contains("3 x 2 pixels") && told.contains("[319.5, 1.0], outside"), "{told}");
+        assert!(refused(&large).contains("4096 x 2049 pixels, at most 8388608"));
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! survey           LAS, LAZ and E57, with the feature `surveys`
 //! mapped_points    points to the voxels and moments of a map, part by part
 //!   collected_voxels   voxels that come one by one          counted   a file, with the place where reading stands
+//!   regular_file       a file that has an end
 //! depth_image      a scan of a depth camera, as PNG
 //! recording        a map as a log, which viewers of logs show
 //! ```
@@ -22,9 +23,11 @@ mod mapped_points;
 pub mod npz;
 pub mod octree;
 mod recording;
+mod regular_file;
 pub mod survey;
 
 pub use depth_image::{DepthImageError, DepthImages};
 pub use file_kind::{FileKind, LackingFeature};
 pub use mapped_points::MappedPoints;
 pub use recording::{RecordedPose, Recorder, RecordingError, begin_recording};
+pub use regular_file::open_regular;

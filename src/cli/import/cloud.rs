@@ -17,14 +17,15 @@ use mrol_map::scan::{PointFilter, read_exact_points_by};
 /// # Errors
 /// When the file cannot be read, or f32 holds its points too coarsely.
 pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, CliError> {
-    let mut map = PointMap::new(import)?;
+    let mut map = PointMap::new(import, output)?;
     map.add(&read_exact_points_by(&import.file, import.columns)?)?;
-    Ok(map.finish(output))
+    Ok(map.finish())
 }
 
 /// A map of points that come part by part, in the coordinates of a file.
 pub(super) struct PointMap<'a> {
     import: &'a ImportOptions,
+    output: &'a Output,
     resolution_m: f64,
     /// None until the first point that counts, near which the origin may lie.
     begun: Option<Begun>,
@@ -43,10 +44,10 @@ impl<'a> PointMap<'a> {
     ///
     /// # Errors
     /// When the resolution is not given, or a setting is out of range.
-    pub(super) fn new(import: &'a ImportOptions) -> Result<Self, CliError> {
+    pub(super) fn new(import: &'a ImportOptions, output: &'a Output) -> Result<Self, CliError> {
         let resolution_m = import.resolution_of_points()?;
         import.settings(resolution_m, None)?;
-        Ok(Self { import, resolution_m, begun: None, no_returns: 0 })
+        Ok(Self { import, output, resolution_m, begun: None, no_returns: 0 })
     }
 
     /// Adds points of the file, meters.
@@ -62,14 +63,19 @@ impl<'a> PointMap<'a> {
         let file = self.import.file.as_path();
         let begun = match &mut self.begun {
             Some(begun) => begun,
-            none => none.insert(Begun::of(self.import, self.resolution_m, file, &returns)?),
+            none => {
+                let begun = Begun::of(self.import, self.resolution_m, file, &returns)?;
+                begun.survey.note_unit(file, &returns, self.output);
+                none.insert(begun)
+            }
         };
         begun.points.add(&begun.survey.near(&file.display().to_string(), &returns)?);
         Ok(())
     }
 
     /// The map, once the points that were left out were told.
-    pub(super) fn finish(self, output: &Output) -> Imported {
+    pub(super) fn finish(self) -> Imported {
+        let output = self.output;
         if self.no_returns > 0 {
             let left_out = count(self.no_returns);
             output.note(format!("{left_out} points are left out: not finite, or at exactly 0 0 0"));

@@ -7,7 +7,7 @@ use uuid::Uuid;
 use super::imported::{Imported, ImportedLine};
 use super::options::ImportOptions;
 use super::{cloud, e57, las, npz, octree};
-use mrol::console::{CliError, Output, check_is_map_file, check_is_no_input};
+use mrol::console::{CliError, Output, check_is_no_input, place_of_map_file};
 use mrol_files::FileKind;
 use mrol_store::{Disk, Snapshot};
 
@@ -40,7 +40,7 @@ impl Import {
     pub(crate) fn run(self, output: Output) -> Result<(), CliError> {
         check_folder(&self.out)?;
         check_is_no_input(&self.out, [self.options.file.as_path()])?;
-        check_is_map_file(&self.out)?;
+        let place = place_of_map_file(&self.out)?;
         let kind =
             FileKind::of(&self.options.file).map(FileKind::checked).transpose().map_err(CliError::usage)?;
         let imported = match kind {
@@ -62,7 +62,7 @@ impl Import {
         }
         let line = ImportedLine::of(&self.out, &imported);
         let Imported { settings, contents } = imported;
-        Snapshot { uuid: Uuid::new_v4(), settings, contents }.write(&Disk::default(), &self.out)?;
+        Snapshot { uuid: Uuid::new_v4(), settings, contents }.write(&Disk::default(), &place)?;
         output.print(&line)?;
         let out = self.out.display();
         output.say(format!("`mrol restore {out}` puts the map on a running server"))

@@ -67,7 +67,8 @@ impl E57Import<'_> {
                 scan.name
             ));
         }
-        let mut map = PointMap::new(self.import)?;
+        let output = self.output.clone();
+        let mut map = PointMap::new(self.import, &output)?;
         for (k, scan) in scans.iter().enumerate() {
             let pose = scan.survey_from_scan.unwrap_or_else(Pose::identity);
             self.parts(k, POINTS_AT_ONCE, |points| {
@@ -75,7 +76,7 @@ impl E57Import<'_> {
                 map.add(&in_survey)
             })?;
         }
-        Ok(map.finish(&self.output))
+        Ok(map.finish())
     }
 
     /// The map of scans at their poses.
@@ -94,6 +95,9 @@ impl E57Import<'_> {
                 let Some(first) = points.first() else { return Ok(()) };
                 // Points that f32 holds too coarsely are too far from the sensor to be those of a scan at its pose.
                 let of_scan = Survey::of(&points, None, false, resolution_m);
+                if parts == 0 {
+                    of_scan.note_unit(file, &points, &output);
+                }
                 let local = of_scan.near(&name, &points).map_err(|_| {
                     CliError::failed(format!(
                         "{name}: its points are too far from its pose for f32: they seem to be in the coordinates of the \

@@ -12,9 +12,9 @@ use mrol_files::survey::LasReader;
 /// When the file cannot be read, or f32 holds its points too coarsely.
 pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, CliError> {
     let file = import.file.as_path();
-    let mut map = PointMap::new(import)?;
     let mut reader = LasReader::open(file).map_err(in_file(file))?;
     let output = output.clone().with_bar_of(reader.points() as usize, "points");
+    let mut map = PointMap::new(import, &output)?;
     let mut read = 0;
     loop {
         let points = reader.next_points().map_err(in_file(file))?;
@@ -26,5 +26,5 @@ pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, 
         output.advance_to(read);
     }
     output.clear_bar();
-    Ok(map.finish(&output))
+    Ok(map.finish())
 }

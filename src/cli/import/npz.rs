@@ -32,7 +32,7 @@ pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, 
             Imported { settings, contents: MapContents::at(1, voxels.map_err(in_file(path))?) }
         }
         NpzContent::Points => {
-            let mut map = PointMap::new(import)?;
+            let mut map = PointMap::new(import, output)?;
             let mut refused = Ok(());
             let read = reader.read_points(|part, read| {
                 if refused.is_ok() {
@@ -43,7 +43,7 @@ pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, 
             });
             read.map_err(in_file(path))?;
             refused?;
-            map.finish(output)
+            map.finish()
         }
     };
     bar.clear_bar();

@@ -1,13 +1,14 @@
 //! Maps of octrees of OctoMap.
 
 use std::fs::File;
-use std::io::{BufReader, ErrorKind};
+use std::io::BufReader;
 use std::path::Path;
 
 use super::imported::{Imported, in_file};
 use super::options::ImportOptions;
 use mrol::console::{CliError, Output, count};
 use mrol_files::octree::{OctreeReader, OctreeVoxels};
+use mrol_files::open_regular;
 use mrol_map::map::MapContents;
 
 /// Bytes that are read at once.
@@ -39,15 +40,5 @@ pub(super) fn read(import: &ImportOptions, output: &Output) -> Result<Imported, 
 
 /// Opens a file, with its length.
 pub(super) fn open(path: &Path) -> Result<(File, u64), CliError> {
-    let open = || {
-        let metadata = path.metadata()?;
-        // Whoever opens a named pipe waits for its writer.
-        match metadata.is_file() {
-            true => Ok((File::open(path)?, metadata.len())),
-            false => {
-                Err(std::io::Error::new(ErrorKind::InvalidInput, "not a regular file: write it to one first"))
-            }
-        }
-    };
-    open().map_err(in_file(path))
+    open_regular(path).map_err(in_file(path))
 }

@@ -15,7 +15,7 @@ use mrol::console::CliError;
 use mrol::console::Output;
 use mrol::console::parse;
 use mrol::console::poses_of_scans;
-use mrol::console::{NewFile, OriginChoice, Survey, check_is_map_file, check_is_no_input};
+use mrol::console::{NewFile, OriginChoice, Survey, check_is_no_input, place_of_map_file};
 use mrol::offline::{KnownScan, Mapper};
 use mrol_map::align::AlignmentSettings;
 use mrol_map::bloom::FilterSettings;
@@ -195,8 +195,22 @@ impl Map {
         &'a self,
         inputs: impl Iterator<Item = &'a Path> + Clone,
     ) -> Result<(), CliError> {
-        self.out.as_deref().map(check_is_map_file).transpose()?;
+        self.out.as_deref().map(place_of_map_file).transpose()?;
         let poses = self.poses_file().map(PathBuf::as_path);
+        if self.out.is_some() && self.out == self.trajectory_out {
+            return Err(CliError::usage("--out and --trajectory-out are the same file"));
+        }
+        // Of a folder each file of poses is read.
+        let in_poses = |path: &Path| {
+            let folder = path.parent().and_then(|folder| folder.canonicalize().ok());
+            path.exists() && poses.is_some_and(|poses| poses.canonicalize().ok() == folder)
+        };
+        if let Some(path) = self.trajectory_out.as_deref().filter(|path| in_poses(path)) {
+            let path = path.display();
+            return Err(CliError::usage(format!(
+                "{path} lies in the folder of poses, and would be replaced: write another file"
+            )));
+        }
         self.trajectory_out.iter().chain(&self.out).try_for_each(|path| {
             check_folder(path)?;
             check_is_no_input(path, inputs.clone().chain(poses))
@@ -311,7 +325,7 @@ impl Map {
             file.keep()?;
         }
         if let Some(path) = &self.out {
-            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk::default(), path)?;
+            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk::default(), &place_of_map_file(path)?)?;
         }
         Ok(())
     }

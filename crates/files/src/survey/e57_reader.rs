@@ -1,17 +1,22 @@
 //! Scans of E57 files.
 
 use std::fs::File;
+use std::io::Seek;
 use std::path::Path;
 
 use e57::{PointCloud, PointCloudReaderRaw, Record, RecordDataType, RecordName, RecordValue};
 use nalgebra::Point3;
 
+use super::e57_claims;
 use super::e57_scan::E57Scan;
 use super::error::SurveyError;
+use crate::regular_file::open_regular;
 use mrol_map::geometry::pose;
 
 /// Most fields of a point.
 const PROTOTYPE_RECORDS_MAX: usize = 256;
+/// Most of them that are constant: they take no bytes in the file, and some in memory.
+const CONSTANT_RECORDS_MAX: usize = 16;
 
 /// An E57 file.
 pub struct E57Reader {
@@ -25,8 +30,12 @@ impl E57Reader {
     /// # Errors
     /// When the file cannot be read or is no E57.
     pub fn open(path: &Path) -> Result<Self, SurveyError> {
-        let reader = e57::E57Reader::new(File::open(path)?)?;
+        let (mut file, length) = open_regular(path)?;
+        e57_claims::check(&mut file, length)?;
+        file.rewind()?;
+        let reader = e57::E57Reader::new(file)?;
         let clouds = reader.pointclouds();
+        check_apart(&clouds)?;
         Ok(Self { reader, clouds })
     }
 
@@ -47,6 +56,16 @@ impl E57Reader {
         let fields = Fields::of(&cloud.prototype)?;
         let prototype = cloud.prototype.clone();
         Ok(E57Points { raw: self.reader.pointcloud_raw(cloud)?, fields, prototype, skipped: 0 })
+    }
+}
+
+/// Refuses scans that share their points, which would take any time to read.
+fn check_apart(clouds: &[PointCloud]) -> Result<(), SurveyError> {
+    let mut offsets: Vec<u64> = clouds.iter().map(|cloud| cloud.file_offset).collect();
+    offsets.sort_unstable();
+    match offsets.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(content(format!("two scans have the same points, at byte {}", pair[0]))),
+        None => Ok(()),
     }
 }
 
@@ -122,6 +141,12 @@ impl Fields {
             }
             RecordDataType::Single { .. } | RecordDataType::Double { .. } => true,
         };
+        let constant = prototype.iter().filter(|record| !takes_bits(record)).count();
+        if constant > CONSTANT_RECORDS_MAX {
+            return Err(content(format!(
+                "points of {constant} fields that are constant, the limit is {CONSTANT_RECORDS_MAX}"
+            )));
+        }
         if !prototype.iter().any(takes_bits) {
             return Err(content("points that take no bytes: every field is constant"));
         }

@@ -8,9 +8,13 @@ use std::io::{self, Read, Seek, SeekFrom};
 use las::raw;
 
 use super::error::SurveyError;
+use super::las_units;
 
 /// Bits of the format of points that say that they are compressed.
 const COMPRESSED: u8 = 0b1100_0000;
+/// Largest step of coordinates, and how far they are shifted at most, meters: beyond the coordinates of the earth.
+const SCALE_MAX: f64 = 1000.0;
+const OFFSET_MAX: f64 = 1e9;
 /// Where an extended record says its length, and how long its head is.
 const EXTENDED_LENGTH_AT: u64 = 20;
 const EXTENDED_HEAD_BYTES: u64 = 60;
@@ -34,6 +38,7 @@ pub(super) fn check(file: &mut (impl Read + Seek), length: u64) -> Result<(), Su
     let header = raw::Header::read_from(&mut *file)?;
     let (offset, record) =
         (u64::from(header.offset_to_point_data), u64::from(header.point_data_record_length));
+    check_transform(&header)?;
     if offset > length {
         return Err(SurveyError::claim(format!("its points begin at byte {offset}"), length));
     }
@@ -50,6 +55,15 @@ pub(super) fn check(file: &mut (impl Read + Seek), length: u64) -> Result<(), Su
             length,
         ));
     }
+    // Of points that are not compressed it is plain how many there are.
+    let first_extended = header.evlr.map_or(length, |evlr| evlr.start_of_first_evlr.min(length));
+    if points == 0 && !is_compressed && first_extended.saturating_sub(offset) >= record {
+        let bytes = first_extended - offset;
+        return Err(damaged(format!(
+            "its header names no points, and {bytes} bytes of points follow: the program that wrote it did not end well"
+        )));
+    }
+    las_units::check(file, u64::from(header.header_size), header.number_of_variable_length_records)?;
     if let Some(evlr) = header.evlr {
         check_extended(file, evlr.start_of_first_evlr, length)?;
     }
@@ -58,6 +72,28 @@ pub(super) fn check(file: &mut (impl Read + Seek), length: u64) -> Result<(), Su
         let laszip = Laszip::find(file, u64::from(header.header_size), records)?;
         laszip.check(header.point_data_record_length)?;
         check_chunks(file, &laszip, Range { offset, length, points, record })?;
+    }
+    Ok(())
+}
+
+/// What coordinates are multiplied with, and what is added to them.
+fn check_transform(header: &raw::Header) -> Result<(), SurveyError> {
+    let axes = [
+        ("x", header.x_scale_factor, header.x_offset),
+        ("y", header.y_scale_factor, header.y_offset),
+        ("z", header.z_scale_factor, header.z_offset),
+    ];
+    for (axis, scale, offset) in axes {
+        if scale.is_nan() || scale <= 0.0 || scale > SCALE_MAX {
+            return Err(damaged(format!(
+                "its header scales {axis} by {scale}, which must be above 0 and at most {SCALE_MAX}"
+            )));
+        }
+        if offset.is_nan() || offset.abs() > OFFSET_MAX {
+            return Err(damaged(format!(
+                "its header shifts {axis} by {offset}, which must be at most {OFFSET_MAX} either way"
+            )));
+        }
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! Points of LAS and LAZ files.
 
-use std::fs::File;
 use std::io::{BufReader, Seek};
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use nalgebra::Point3;
 
 use super::error::SurveyError;
 use super::las_claims;
+use crate::regular_file::open_regular;
 
 /// Points that are read at once.
 const POINTS_AT_ONCE: u64 = 1 << 16;
@@ -23,10 +23,10 @@ impl LasReader {
     /// Opens the file at `path`, whose claims are checked against its length.
     ///
     /// # Errors
-    /// When the file cannot be read, is no LAS, or claims more than it has.
+    /// When the file cannot be read, is no LAS, claims more than it has, or names another unit than meters.
     pub fn open(path: &Path) -> Result<Self, SurveyError> {
-        let mut file = BufReader::new(File::open(path)?);
-        let length = file.get_ref().metadata()?.len();
+        let (file, length) = open_regular(path)?;
+        let mut file = BufReader::new(file);
         las_claims::check(&mut file, length)?;
         file.rewind()?;
         let mut reader = Reader::new(file)?;

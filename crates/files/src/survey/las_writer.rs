@@ -8,6 +8,7 @@ use las::point::Format;
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 
 use super::error::SurveyError;
+use super::failing_late::{FailingLate, Failure};
 use super::las_kind::LasKind;
 
 /// Steps of coordinates in a file, the finest first, meters.
@@ -46,12 +47,15 @@ pub fn write_las(
     builder.generating_software = "mrol".to_owned();
     let axis = |k: usize| Transform { scale, offset: origin_m[k] };
     builder.transforms = Vector { x: axis(0), y: axis(1), z: axis(2) };
-    let file = BufWriter::new(File::create(path)?);
+    let failure = Failure::default();
+    let file = FailingLate::new(BufWriter::new(File::create(path)?), failure.clone());
     let mut writer = Writer::new(file, builder.into_header()?)?;
     for [x, y, z] in points {
         let [x, y, z] = [x + origin_m[0], y + origin_m[1], z + origin_m[2]];
         writer.write_point(Point { x, y, z, return_number: 1, number_of_returns: 1, ..Point::default() })?;
+        failure.check()?;
     }
-    writer.close()?;
-    Ok(())
+    // The header is written last, and the buffer is written where it goes back to the start.
+    writer.into_inner()?;
+    Ok(failure.check()?)
 }

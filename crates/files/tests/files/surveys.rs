@@ -171,6 +171,15 @@ fn claims_that_a_file_cannot_hold_are_refused_before_anything_is_read_by_them() 
     refused("plain.las", &[(107, &many)], "4294967295 points of 28 bytes");
     refused("plain.las", &[(96, &many)], "begin at byte 4294967295");
     refused("plain.laz", &[(107, &many)], "fewer than the 4294967295 points");
+    refused("plain.las", &[(107, &[0; 4])], "names no points, and 8400 bytes of points follow");
+    for (scale, told) in
+        [(0.0, "scales z by 0,"), (-0.01, "scales z by -0.01,"), (f64::NAN, "NaN"), (1e300, "at most 1000")]
+    {
+        refused("plain.las", &[(147, &f64::to_le_bytes(scale))], told);
+    }
+    for offset in [f64::NAN, f64::INFINITY, 1e300] {
+        refused("plain.laz", &[(155, &offset.to_le_bytes())], "shifts x by");
+    }
     // An extended record, for whose claim a reader would make room.
     let record = [&200u64.to_le_bytes()[..], &1u32.to_le_bytes()].concat();
     refused(
@@ -192,6 +201,47 @@ fn claims_that_a_file_cannot_hold_are_refused_before_anything_is_read_by_them() 
     let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
     refused("layered.laz", &[(points + 8 + record + 4, &many)], "layers of chunk 0");
     refused("layered.laz", &[(points + 8 + record, &many)], "chunk 0 says");
+}
+
+#[test]
+fn an_xml_that_takes_a_parser_forever_is_refused_and_so_are_scans_that_share_their_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.e57");
+    let whole = fs::read(fixture("scans.e57")).unwrap();
+    let mut content: Vec<u8> = whole.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();
+    let number = |at: usize| u64::from_le_bytes(*whole[at..].first_chunk().unwrap()) as usize;
+    let (place, length) = (number(24), number(32));
+    let begin = place - place / 1024 * 4;
+    let xml = String::from_utf8(content[begin..begin + length].to_vec()).unwrap();
+    let mut refused = |xml: &str, what: &str| {
+        content.truncate(begin);
+        content.extend(xml.as_bytes());
+        content.resize(content.len().div_ceil(1020) * 1020, 0);
+        let mut file: Vec<u8> = content.chunks(1020).flat_map(|page| [page, &[0; 4]].concat()).collect();
+        let (bytes, length) = (file.len() as u64, xml.len() as u64);
+        file[16..24].copy_from_slice(&bytes.to_le_bytes());
+        file[32..40].copy_from_slice(&length.to_le_bytes());
+        seal(&mut file);
+        fs::write(&path, file).unwrap();
+        let error = e57_points(&path).map(|scans| scans.len()).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    };
+    let nested: String = (0..8000).map(|k| format!("<a xmlns:a{k}=\"u{k}\">")).collect();
+    refused(&(nested + &"</a>".repeat(8000)), "more than 64 deep");
+    let offset = |xml: &str| {
+        let at = xml.find("fileOffset=\"").unwrap() + 12;
+        xml[at..].split('"').next().unwrap().to_owned()
+    };
+    let first = offset(&xml);
+    let second = offset(&xml[xml.find(&first).unwrap() + 20..]);
+    let same = xml.replace(&format!("fileOffset=\"{second}\""), &format!("fileOffset=\"{first}\""));
+    refused(&same, "two scans have the same points");
+    let constant: String =
+        (0..17).map(|k| format!("<f{k} type=\"Integer\" minimum=\"0\" maximum=\"0\"/>")).collect();
+    refused(
+        &xml.replacen("</prototype>", &(constant + "</prototype>"), 1),
+        "17 fields that are constant, the limit is 16",
+    );
 }
 
 #[test]

@@ -37,6 +37,17 @@ pub enum NoCamera {
         /// Pixels that are one, along a row and along a column.
         binning: [u32; 2],
     },
+    /// Numbers of images of another size.
+    #[error(
+        "its CameraInfo has images of {size:?} pixels, and the camera's axis meets them at {center:?}, outside of them: \
+         are these the intrinsics of images of this size?"
+    )]
+    Center {
+        /// Column and row where the axis meets the image.
+        center: [f64; 2],
+        /// Columns and rows.
+        size: [u32; 2],
+    },
     /// Pixels whose rows and columns are not square to each other.
     #[error("its CameraInfo has the skew {0}, and images without one are read: let image_proc rectify them")]
     Skew(f64),
@@ -72,6 +83,10 @@ impl Camera {
             return Err(NoCamera::Focal(x, y));
         }
         let intrinsics = Intrinsics { focal: [x, y], center: [center_x, center_y] };
-        Ok(Self { height: info.height, width: info.width, intrinsics })
+        let size = [info.width, info.height];
+        match intrinsics.fits(size) {
+            true => Ok(Self { height: info.height, width: info.width, intrinsics }),
+            false => Err(NoCamera::Center { center: intrinsics.center, size }),
+        }
     }
 }

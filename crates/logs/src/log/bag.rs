@@ -195,6 +195,9 @@ fn is_compressed(path: &Path) -> bool {
 /// How a database of SQLite begins.
 #[cfg(feature = "sqlite")]
 const DATABASE_BEGIN: &[u8] = b"SQLite format 3\0";
+/// How many times as large a database may be as it is compressed: clouds shrink to a tenth.
+#[cfg(feature = "sqlite")]
+const UNPACKED_MAX: u64 = 1000;
 
 /// The messages of a file, by its ending: without one that is known, it is taken for MCAP.
 fn messages_of(path: &Path) -> Result<Box<dyn Messages + Send>, LogError> {
@@ -224,15 +227,24 @@ fn messages_of_database(path: &Path) -> Result<Box<dyn Messages + Send>, LogErro
     if !is_compressed(path) {
         return Ok(Box::new(DatabaseReader::open(path)?));
     }
-    let mut database = decompressed(BufReader::with_capacity(BUFFER_BYTES, File::open(path)?))?;
-    // What is no database is not unpacked.
+    let file = File::open(path)?;
+    let compressed_bytes = file.metadata()?.len();
+    let mut database = decompressed(BufReader::with_capacity(BUFFER_BYTES, file))?;
+    // What is no database is not unpacked, and neither is what would fill a disk.
     let mut begin = Vec::new();
     (&mut database).take(DATABASE_BEGIN.len() as u64).read_to_end(&mut begin)?;
     if begin != DATABASE_BEGIN {
         return Err(LogError::NoBag(format!("what is compressed in it begins with {begin:02x?}")));
     }
+    let bytes_max = compressed_bytes.saturating_mul(UNPACKED_MAX);
     let mut unpacked = tempfile::Builder::new().prefix("mrol-log-").suffix(".db3").tempfile()?;
-    std::io::copy(&mut (&begin[..]).chain(database), &mut unpacked)?;
+    let copied = std::io::copy(&mut (&begin[..]).chain(database).take(bytes_max + 1), &mut unpacked)?;
+    if copied > bytes_max {
+        return Err(LogError::NoBag(format!(
+            "its {compressed_bytes} bytes unpack to more than {UNPACKED_MAX} times as many: if that is right, unpack it by \
+             `zstd -d` and give the .db3"
+        )));
+    }
     Ok(Box::new(DatabaseReader::open_unpacked(unpacked)?))
 }
 

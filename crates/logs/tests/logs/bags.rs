@@ -136,6 +136,10 @@ fn a_compressed_file_that_is_no_database_is_not_unpacked_and_computed_columns_ar
     let zeros = folder.path().join("zeros.db3.zstd");
     fs::write(&zeros, zstd::bulk::compress(&vec![0; 10 << 20], 3).unwrap()).unwrap();
     assert!(refusal(&zeros).to_string().contains("what is compressed in it begins with"));
+    let bomb = [&b"SQLite format 3\0"[..], &vec![0; 64 << 20]].concat();
+    let bomb_file = folder.path().join("bomb.db3.zstd");
+    fs::write(&bomb_file, zstd::bulk::compress(&bomb, 3).unwrap()).unwrap();
+    assert!(refusal(&bomb_file).to_string().contains("unpack to more than 1000 times as many"));
     let computed = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,
                     data BLOB GENERATED ALWAYS AS (zeroblob(60000000)) VIRTUAL);
                     INSERT INTO messages(topic_id, timestamp) VALUES (1, 1), (1, 2);";

@@ -16,7 +16,7 @@ pub struct Intrinsics {
 /// A text that has no intrinsics.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "must be \"fx fy cx cy\", four numbers of pixels, the focal lengths not 0, such as \"525 525 319.5 239.5\""
+    "must be \"fx fy cx cy\", four numbers of pixels, finite and the focal lengths not 0, such as \"525 525 319.5 239.5\""
 )]
 pub struct IntrinsicsError;
 
@@ -26,6 +26,15 @@ impl Intrinsics {
     pub fn point(&self, column: usize, row: usize, depth_m: f64) -> Point3<f64> {
         let Self { focal: [fx, fy], center: [cx, cy] } = *self;
         Point3::new((column as f64 - cx) / fx * depth_m, (row as f64 - cy) / fy * depth_m, depth_m)
+    }
+}
+
+impl Intrinsics {
+    /// True where the optical axis meets an image of so many columns and rows: those of other sizes have other
+    /// intrinsics.
+    pub fn fits(&self, size: [u32; 2]) -> bool {
+        let is_within = |(center, size): (&f64, u32)| (-0.5..=f64::from(size) - 0.5).contains(center);
+        self.center.iter().zip(size).all(is_within)
     }
 }
 
@@ -56,6 +65,8 @@ mod tests {
         let camera: Intrinsics = "500 -250, 319.5 239.5".parse().unwrap();
         assert_eq!(camera.point(319, 239, 2.0), Point3::new(-0.002, 0.004, 2.0));
         assert_eq!(camera.point(569, 0, 2.0).x, 0.998);
+        assert!(camera.fits([640, 480]) && camera.fits([320, 240]));
+        assert!(!camera.fits([319, 480]) && !camera.fits([640, 239]));
     }
 
     #[test]
