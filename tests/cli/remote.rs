@@ -1,5 +1,7 @@
 //! `mrol serve`, and what is done with it: maps, insert, query, delete.
 
+use mrol::geometry::Point;
+use mrol::scan::write_f32;
 use serde_json::{Value, json};
 
 use super::{Sequence, complaint, mrol, objects};
@@ -312,4 +314,20 @@ fn an_undo_of_a_robot_that_the_map_does_not_know_names_those_that_it_knows() {
     assert_eq!(daemon.call(&undo)[0]["scans"], 1);
     // The robot stays known, and nothing is left to undo.
     assert_eq!(daemon.call(&undo)[0]["scans"], 0);
+}
+
+#[test]
+fn a_scan_that_is_larger_than_a_message_may_be_is_refused_by_name() {
+    let server = Process::start("", &[]);
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("scan.f32");
+    // A surface: 34 MB.
+    let points = (0..2_900_000).map(|k| Point::new((k % 1700) as f32 * 0.01, (k / 1700) as f32 * 0.01, 2.0));
+    write_f32(&scan, &points.collect::<Vec<_>>()).unwrap();
+    objects(&["maps", "create", "a", "--resolution", "0.1", "--server", &server.grpc]);
+    let sent =
+        mrol(&["insert", scan.to_str().unwrap(), "--map", "a", "--server", &server.grpc]).output().unwrap();
+    let said = [sent.stdout, sent.stderr].map(|said| String::from_utf8(said).unwrap()).concat();
+    assert!(!sent.status.success() && said.contains("message_bytes_max is 33554432"), "{said}");
+    assert!(!said.contains("lost the connection"), "{said}");
 }

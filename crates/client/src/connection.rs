@@ -61,19 +61,16 @@ impl Connection {
     pub(super) fn occupancy(&self) -> OccupancyClient<Keyed> {
         OccupancyClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
-            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
     pub(super) fn mapping(&self) -> MappingClient<Keyed> {
         MappingClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
-            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
     pub(super) fn maps(&self) -> MapsClient<Keyed> {
         MapsClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
-            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
     pub(super) fn failure(&self, status: &Status) -> ClientError {
