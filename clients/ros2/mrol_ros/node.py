@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from threading import Event, Thread
@@ -179,7 +179,8 @@ class MrolNode(Node):
 
     # What comes in.
 
-    def _on_cloud(self, message: PointCloud2) -> None:
+    def _on_cloud(self, message: PointCloud2, info: Mapping[str, Any]) -> None:
+        self._mapper.lost.see(info["publication_sequence_number"])
         self._mapper.queue.put(cloud_of(message))
 
     def _on_tf(self, message: TFMessage) -> None:
