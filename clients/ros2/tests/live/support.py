@@ -97,6 +97,11 @@ class NodeProcess:
         """Its process."""
         return self._process.pid
 
+    @property
+    def has_ended(self):
+        """Whether it runs no more."""
+        return self._process.poll() is not None
+
     def stop(self):
         """Ends it by Ctrl-C; how it ended."""
         if self._process.poll() is not None:
