@@ -92,7 +92,8 @@ def main(seconds, points, reliability):
 def counts(robot):
     """What became of the clouds so far, by diagnostics."""
     values = robot.status("clouds")[2]
-    return {name: int(values[name]) for name in ("received", "dropped", "accepted", "refused", "late", "not_sent", "without_times")}
+    names = ("received", "lost", "dropped", "accepted", "refused", "late", "not_sent", "without_times")
+    return {name: int(values[name]) for name in names}
 
 
 if __name__ == "__main__":

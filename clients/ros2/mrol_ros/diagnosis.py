@@ -34,10 +34,11 @@ class Diagnosis:
         ]
 
     def _numbers(self) -> dict[str, int]:
-        queue = self._mapper.queue
-        return {"received": queue.received, "dropped": queue.dropped, **asdict(self._mapper.state.counts)}
+        queue, lost = self._mapper.queue, self._mapper.lost.count
+        return {"received": queue.received, "lost": lost, "dropped": queue.dropped, **asdict(self._mapper.state.counts)}
 
     def _of_clouds(self, publishers: int) -> Status:
+        self._mapper.lost.settle(publishers)
         numbers, state = self._numbers(), self._mapper.state
         since = {name: numbers[name] - self._before[name] for name in numbers}
         self._before = numbers
@@ -70,8 +71,9 @@ class Diagnosis:
             text = f"{since['late']} of {since['received']} clouds were left out: their stamps are not later than the one before"
         elif since["not_sent"] > since["accepted"]:
             level, text = "error", f"the server does not take clouds: {state.left_out}"
-        elif since["dropped"] > since["accepted"]:
-            level, text = "warn", f"{since['dropped']} of {since['received']} clouds were dropped for newer ones"
+        elif since["dropped"] + since["lost"] > since["accepted"]:
+            level = "warn"
+            text = f"{since['dropped']} of {since['received']} clouds were dropped for newer ones, and {since['lost']} never came"
         else:
             level, text = "ok", "clouds are mapped"
         return "clouds", level, text, values

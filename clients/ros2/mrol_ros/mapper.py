@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .clouds import CloudError, StampedCloud, read_cloud
 from .frames import is_frame_name
 from .guesses import INITIAL_POSE_TRIES, Guesses, InitialPose
+from .lost import LostClouds
 from .mapper_state import MapperState
 from .newest import NewestQueue
 from .odometry import Odometry, SensorPlace
@@ -78,6 +79,7 @@ class Mapper:
         `robot` is its name on the server; `own_scans` is told of each scan that is sent.
         """
         self.queue: NewestQueue[StampedCloud] = NewestQueue()
+        self.lost = LostClouds()
         self.state = MapperState()
         self.guesses = Guesses(options, odometry, robot)
         self.own_scans = own_scans or OwnScans(robot)

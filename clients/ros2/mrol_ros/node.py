@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from threading import Event, Thread
@@ -21,6 +21,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Odometry as OdometryMessage
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -73,6 +74,9 @@ WARNING_MAX = 3000
 CLOSE_MAX_S = 2.0
 """How long callbacks may take to end, and how long the request that is under way."""
 
+SIGNAL_S = 0.5
+"""How long a signal may be overlooked."""
+
 FRAME_SHOWN = 40
 
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
@@ -86,7 +90,7 @@ class MrolNode(Node):
         super().__init__("mrol")
         self.options = self._declared()
         self.robot = self.options.robot_name(self.get_namespace())
-        is_simulated = bool(self.get_parameter("use_sim_time").value)
+        self._is_simulated = bool(self.get_parameter("use_sim_time").value)
         self._link = ServerLink(self.options, self.robot)
         self._odometry = Odometry(self.options)
         self._own_scans = OwnScans(self.robot)
@@ -97,7 +101,7 @@ class MrolNode(Node):
             self._on_mapped,
             self._warn,
             robot=self.robot,
-            is_simulated=is_simulated,
+            is_simulated=self._is_simulated,
             own_scans=self._own_scans,
         )
         self._feed = MapFeed(
@@ -134,9 +138,10 @@ class MrolNode(Node):
         self._grid = self.create_publisher(OccupancyGrid, "map", LATCHED)
         self._centers = self.create_publisher(PointCloud2, "octomap_point_cloud_centers", LATCHED)
         self._octomap = None if Octomap is None else self.create_publisher(Octomap, "octomap_binary", LATCHED)
-        if self.options.publish_tf:
-            self.create_timer(self.options.transform_period_s, self._keep_tf)
-        self.create_timer(1.0, self._tell)
+        # By the wall clock a timer would stop for an hour where that is set back by one.
+        clock = self.get_clock() if self._is_simulated else Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(self.options.transform_period_s, self._keep_tf, clock=clock)
+        self.create_timer(1.0, self._tell, clock=clock)
 
     def _make_subscriptions(self) -> None:
         self.create_subscription(TFMessage, "/tf", self._on_tf, TF_QOS)
@@ -179,7 +184,8 @@ class MrolNode(Node):
 
     # What comes in.
 
-    def _on_cloud(self, message: PointCloud2) -> None:
+    def _on_cloud(self, message: PointCloud2, info: Mapping[str, Any]) -> None:
+        self._mapper.lost.see(info["publication_sequence_number"])
         self._mapper.queue.put(cloud_of(message))
 
     def _on_tf(self, message: TFMessage) -> None:
@@ -257,10 +263,12 @@ class MrolNode(Node):
     def _keep_tf(self) -> None:
         now_ns = self._now_ns()
         if now_ns < self._last_now_ns - 1_000_000_000:
-            # A simulation that began anew.
+            # A simulation that began anew, or a clock that was set.
             self._correction.clock_was_set_back()
             self._odometry.clock_was_set_back()
         self._last_now_ns = now_ns
+        if not self.options.publish_tf:
+            return
         again = self._correction.keep_alive(now_ns, self._period_ns)
         if again is not None:
             self._publish_tf(again)
@@ -365,7 +373,9 @@ def main() -> None:
     executor.add_node(node)
     spinning = Thread(target=spin, args=(executor, node.callback_failed), daemon=True)
     spinning.start()
-    ended.wait()
+    while not ended.wait(SIGNAL_S):
+        # A signal that the system gave to another thread wakes nobody up, and is seen by this one when it wakes.
+        pass
     executor.shutdown(timeout_sec=CLOSE_MAX_S)
     spinning.join(CLOSE_MAX_S)
     node.close()

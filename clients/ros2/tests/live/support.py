@@ -97,6 +97,11 @@ class NodeProcess:
         """Its process."""
         return self._process.pid
 
+    @property
+    def has_ended(self):
+        """Whether it runs no more."""
+        return self._process.poll() is not None
+
     def stop(self):
         """Ends it by Ctrl-C; how it ended."""
         if self._process.poll() is not None:
@@ -153,6 +158,9 @@ def stamp(stamp_ns):
 
 class Robot:
     """A robot that drives in the room: its odometry begins where it stands, and drifts."""
+
+    CATCH_UP_SHARE = 0.7
+    """After a stall clouds come at this share of the period at least: of a robot that seems to stand no scan is kept."""
 
     def __init__(
         self, *, namespace="", begin=(0.0, 0.0), hz=5.0, points=15_000, own_tf=False, reliable=True, late_s=0.02, has_times=False
@@ -249,7 +257,8 @@ class Robot:
             if self._stop.wait(self._late_s):
                 return
             self._send_tf(stamp_ns)
-            self._stop.wait(max(0.0, begin + self.sent / self._hz - time.monotonic()))
+            least_s = self.CATCH_UP_SHARE / self._hz - (time.time_ns() - stamp_ns) * 1e-9
+            self._stop.wait(max(0.0, least_s, begin + self.sent / self._hz - time.monotonic()))
 
     @property
     def listeners(self):

@@ -1,6 +1,8 @@
 """The node among publishers, callers and servers that do what they should not."""
 
+import ctypes
 import math
+import signal
 import time
 from array import array
 from itertools import count
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 import rclpy
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Imu, PointCloud2, PointField
 from std_srvs.srv import SetBool, Trigger
@@ -18,6 +21,7 @@ from tf2_msgs.msg import TFMessage
 
 from mrol_ros.callbacks import spin
 from mrol_ros.messages import STAMP_MAX_NS, stamp_ns_of, stamp_of
+from mrol_ros.node import MrolNode
 
 from .proxy import Proxy
 from .support import LATCHED, RELIABLE, NodeProcess, Robot, call, running, stamp, wait_until
@@ -211,7 +215,7 @@ def test_no_answer_of_a_server_ends_the_node_and_all_is_well_when_it_is_itself_a
         for name, treat in {**{name: answering(answer) for name, answer in ANSWERS.items()}, "slowly": slow}.items():
             began_ns = time.time_ns()
             proxy.treat(treat)
-            wait_until(lambda: robot.status("server")[0] == 2, 30, f"diagnostics of {name}")
+            wait_until(lambda: (robot.status("server") or (0,))[0] == 2, 30, f"diagnostics of {name}")
             time.sleep(2)
             assert sum(of[0] > began_ns for of in list(robot.corrections)) >= 5, name
             proxy.treat(None)
@@ -245,6 +249,16 @@ def test_two_nodes_of_one_name_are_told_of_each_other(server, tmp_path):
         assert node.log.read_text().count("another program sends scans as robot 'cart'") == 1
 
 
+def test_no_timer_waits_for_a_wall_clock_that_was_set_back():
+    rclpy.init(args=["--ros-args", "-p", "server:=127.0.0.1:1"])
+    node = MrolNode()
+    clocks = [timer.clock.clock_type for timer in node.timers]
+    node.close()
+    node.destroy_node()
+    rclpy.shutdown()
+    assert clocks == [ClockType.STEADY_TIME] * 2
+
+
 def test_ctrl_c_ends_the_node_while_the_server_says_nothing(server, tmp_path):
     robot, proxy = Robot(), Proxy(server)
     robot.start()
@@ -254,6 +268,19 @@ def test_ctrl_c_ends_the_node_while_the_server_says_nothing(server, tmp_path):
         proxy.freeze()
         time.sleep(2)
         assert node.stop() == 0
+    assert "Traceback" not in node.log.read_text()
+
+
+def test_a_signal_that_another_thread_gets_ends_the_node(server, tmp_path):
+    robot = Robot()
+    robot.start()
+    node = NodeProcess(tmp_path, server, robot="r1", **CLOUDS)
+    with running(robot, node):
+        wait_until(lambda: len(robot.poses) >= 2, 150, "poses")
+        for thread in Path(f"/proc/{node.pid}/task").iterdir():
+            if int(thread.name) != node.pid:
+                ctypes.CDLL(None).tgkill(node.pid, int(thread.name), signal.SIGTERM)
+        wait_until(lambda: node.has_ended, 30, "the end")
     assert "Traceback" not in node.log.read_text()
 
 

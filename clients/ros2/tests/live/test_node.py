@@ -1,5 +1,6 @@
 """The node against a real server, and a simulated robot by real ROS."""
 
+import os
 import time
 from contextlib import ExitStack
 from itertools import pairwise
@@ -24,6 +25,9 @@ from .support import BASE_FROM_LIDAR, NodeProcess, Robot, call, running, stamp, 
 
 TOLERANCE_NS = 3_000_000_000
 """So long that the answer to each cloud comes in time, however busy the machine is."""
+
+OUTAGE_S = float(os.environ.get("MROL_OUTAGE_S", "20"))
+"""For so long the network loses all: MROL_OUTAGE_S=120 clients/ros2/check PROGRAM tries two minutes."""
 
 CLOUDS = {"clouds_reliable": True, "grid_period_s": 0.5, "octomap_period_s": 0.5}
 
@@ -235,7 +239,7 @@ def test_nothing_is_lost_or_there_twice_when_the_network_is_gone(server, tmp_pat
     assert "Traceback" not in node.log.read_text()
 
 
-def test_nothing_is_lost_or_there_twice_when_the_network_loses_all_for_twenty_seconds(server, tmp_path):
+def test_nothing_is_lost_or_there_twice_when_the_network_loses_all_for_long(server, tmp_path):
     robot, proxy = Robot(), Proxy(server)
     robot.start()
     node = NodeProcess(tmp_path, proxy, robot="r1", request_timeout_s=3.0, **CLOUDS)
@@ -243,7 +247,7 @@ def test_nothing_is_lost_or_there_twice_when_the_network_loses_all_for_twenty_se
         wait_until(lambda: len(robot.poses) >= 5, 150, "poses")
         began_ns = time.time_ns()
         proxy.lose()
-        time.sleep(20)
+        time.sleep(OUTAGE_S)
         ended_ns = time.time_ns()
         assert robot.status("server")[0] == 2
         proxy.find()
@@ -256,7 +260,7 @@ def test_nothing_is_lost_or_there_twice_when_the_network_loses_all_for_twenty_se
         assert ends[0] < began_ns + 2 * 10**9
         assert ends[-1] > ended_ns - 10**9
         gaps = [later - sooner for sooner, later in pairwise(ends)]
-        assert len(ends) > 20, ends
+        assert len(ends) > OUTAGE_S, ends
         assert max(gaps) < 2 * 10**9
         assert int(robot.status("clouds")[2]["repeated"]) > 0
         call(SetBool, "/pause", SetBool.Request(data=True))

@@ -225,6 +225,19 @@ def test_clouds_that_are_all_left_out_are_not_said_to_be_mapped():
         assert words in text
 
 
+def test_clouds_that_never_came_are_told():
+    robot = Robot()
+    diagnosis = diagnosed(robot)
+    diagnosis.statuses(1)
+    for number in (1, 2, 5):
+        robot.mapper.lost.see(number)
+    robot.mapper.queue.put(cloud(0))
+    robot.step(robot.mapper.queue.take(0))
+    _, level, text, values = diagnosis.statuses(1)[0]
+    assert (level, values["lost"]) == ("warn", "2")
+    assert "2 never came" in text
+
+
 def test_what_diagnostics_say_is_short_and_can_be_sent():
     robot = Robot("\ud800\0\n" * 100_000)
     robot.mapper.queue.put(cloud(0))

@@ -11,6 +11,7 @@ from mrol import Pose
 
 from mrol_ros.correction import LEAST_STD, OPEN_VARIANCE, Correction, covariance_of, guess_covariance, moved_covariance
 from mrol_ros.gravity import G, GravityWindow
+from mrol_ros.lost import LostClouds
 from mrol_ros.newest import NewestQueue
 from mrol_ros.occupancy_grid import grid_cells
 from mrol_ros.options import DESCRIPTIONS, OptionError, Options
@@ -41,6 +42,32 @@ def test_whoever_waits_for_an_item_gets_it_and_a_close_ends_the_waiting():
     queue.close()
     thread.join(10)
     assert taken == ["item", None]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "publishers", "count"),
+    [
+        ([34, 35, 37, 40], 1, 3),
+        ([34, 35, 36], 1, 0),
+        # Two publishers, one that was started again, and a middleware without numbers.
+        ([500, 1, 501, 2, 502], 2, 0),
+        ([500, 1, 2], 1, 0),
+        ([2**64 - 1] * 3, 1, 0),
+    ],
+)
+def test_clouds_that_never_came_are_counted_where_one_publisher_numbers_them(numbers, publishers, count):
+    lost = LostClouds()
+    lost.settle(publishers)
+    for number in numbers:
+        lost.see(number)
+    lost.settle(publishers)
+    lost.settle(publishers)
+    assert lost.count == count
+    # From then on as usual.
+    lost.settle(1)
+    lost.see(numbers[-1] + 2)
+    lost.settle(1)
+    assert lost.count == count + 1
 
 
 def turned(x, y, degrees):
