@@ -27,6 +27,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import Imu, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
@@ -154,7 +155,9 @@ class MrolNode(Node):
         if self.options.imu_topic:
             self.create_subscription(Imu, self.options.imu_topic, self._on_imu, _sensor_qos(200, is_reliable=False))
         clouds_qos = _sensor_qos(2, is_reliable=self.options.clouds_reliable)
-        self._clouds = self.create_subscription(PointCloud2, "cloud_in", self._on_cloud, clouds_qos)
+        # Humble tells nothing of a message beside it.
+        on_cloud = self._on_numbered_cloud if hasattr(Subscription, "CallbackType") else self._on_cloud
+        self._clouds = self.create_subscription(PointCloud2, "cloud_in", on_cloud, clouds_qos)
 
     def _make_services(self) -> None:
         offered: list[tuple[Any, str, Callable[[Any, Any], Any]]] = [
@@ -184,9 +187,14 @@ class MrolNode(Node):
 
     # What comes in.
 
-    def _on_cloud(self, message: PointCloud2, info: Mapping[str, Any]) -> None:
-        self._mapper.lost.see(info["publication_sequence_number"])
+    def _on_cloud(self, message: PointCloud2) -> None:
         self._mapper.queue.put(cloud_of(message))
+
+    def _on_numbered_cloud(self, message: PointCloud2, info: Mapping[str, Any]) -> None:
+        number = info.get("publication_sequence_number")
+        if number is not None:
+            self._mapper.lost.see(number)
+        self._on_cloud(message)
 
     def _on_tf(self, message: TFMessage) -> None:
         self._note(message, is_static=False)
