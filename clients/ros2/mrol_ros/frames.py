@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -33,6 +34,13 @@ TREE_POSES_MAX = 200_000
 SAME_M = 1e-3
 SAME_DEG = 0.1
 """Two poses of a frame as close as this are told as the same."""
+
+JUMP_M = 1.0
+JUMP_M_PER_S = 100.0
+"""A frame that goes farther from one pose to the next, and faster, has jumped."""
+
+JUMPS_MIN = 3
+"""So many jumps in ten seconds are of two publishers that tell different things; one is of an odometry that began anew."""
 
 FRAMES_MAX = 1000
 DEPTH_MAX = 64
@@ -61,6 +69,13 @@ class Track:
     """Ascending, all different."""
     poses: list[tuple[float, ...]] = field(default_factory=list)
     """x y z qx qy qz qw."""
+    jumps_ns: deque[int] = field(default_factory=lambda: deque(maxlen=JUMPS_MIN))
+    """When it jumped."""
+
+    @property
+    def is_torn(self) -> bool:
+        """Whether it jumps to and fro."""
+        return len(self.jumps_ns) == JUMPS_MIN and self.stamps_ns[-1] - self.jumps_ns[0] <= KEPT_NS
 
     def insert(self, stamp_ns: int, seven: tuple[float, ...], most: int = POSES_MAX) -> None:
         """Adds a pose; one of the same stamp is replaced. The newest `most` are kept.
@@ -71,10 +86,15 @@ class Track:
         if self.stamps_ns and self.stamps_ns[-1] - stamp_ns > KEPT_NS:
             self.stamps_ns.clear()
             self.poses.clear()
+            self.jumps_ns.clear()
         at = bisect_left(self.stamps_ns, stamp_ns)
         if at < len(self.stamps_ns) and self.stamps_ns[at] == stamp_ns:
             self.poses[at] = seven
             return
+        if self.stamps_ns and at == len(self.stamps_ns):
+            gone_m, took_s = math.dist(seven[:3], self.poses[-1][:3]), (stamp_ns - self.stamps_ns[-1]) * 1e-9
+            if gone_m > max(JUMP_M, JUMP_M_PER_S * took_s):
+                self.jumps_ns.append(stamp_ns)
         self.stamps_ns.insert(at, stamp_ns)
         self.poses.insert(at, seven)
         self.cut(most)
@@ -183,8 +203,9 @@ class FrameTree:
 
     def contradictions(self, frame: str) -> list[str]:
         """What publishers say against each other of a frame and those above it, a sentence each."""
-        links = [self._links[of] for of in self.ancestors(frame) if of in self._links]
-        return [link.contradiction for link in links if link.contradiction]
+        links = [(of, self._links[of]) for of in self.ancestors(frame) if of in self._links]
+        torn = [jumping(link.parent, of) for of, link in links if link.track.is_torn]
+        return [link.contradiction for _, link in links if link.contradiction] + torn
 
     def has(self, frame: str) -> bool:
         """Whether a frame is a child or a parent."""
@@ -289,6 +310,11 @@ def checked_transform(parent: str, child: str, seven: Sequence[float]) -> tuple[
     if not (all(map(math.isfinite, (x, y, z))) and 0.5 <= length <= 2.0):
         raise BadTransform(f"the transform from {child!r} to {parent!r} has numbers that are no pose")
     return x, y, z, qx / length, qy / length, qz / length, qw / length
+
+
+def jumping(parent: str, child: str) -> str:
+    """A sentence about a frame whose track is torn."""
+    return f"frame {child!r} jumps to and fro in {parent!r}: do two publishers tell of it?"
 
 
 def _degrees(turn: Pose) -> float:

@@ -9,7 +9,7 @@ from threading import Condition
 
 from mrol import Pose
 
-from .frames import EXTRAPOLATION_MAX_NS, FrameTree, NoTransform, Track, checked_transform, plain_frame
+from .frames import EXTRAPOLATION_MAX_NS, FrameTree, NoTransform, Track, checked_transform, jumping, plain_frame
 from .options import Options
 
 WAIT_S = 1.0
@@ -53,6 +53,8 @@ class Odometry:
         """What publishers say against each other of the frames that a sensor's place is made of, a sentence each."""
         with self._changed:
             own = self._frames.contradictions(sensor)
+            if self._track.is_torn:
+                own.append(jumping(self._odom, self._moving))
             return own + [of for of in self._frames.contradictions(self._moving) if of not in own]
 
     def note_transform(self, parent: str, child: str, stamp_ns: int, seven: Sequence[float], *, is_static: bool) -> None:

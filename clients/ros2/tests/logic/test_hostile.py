@@ -159,6 +159,29 @@ def test_all_frames_together_keep_so_many_poses():
     assert frames.transform("odom", "base_link", (POSES_MAX - 1) * 10**5).translation_m[0] == POSES_MAX - 1
 
 
+@pytest.mark.parametrize("topic", ["", "odom"])
+def test_two_publishers_of_one_odometry_are_told_and_one_that_begins_anew_is_not(topic):
+    robot = Robot(has_odometry=False, options=Options(resolution=0.0, odometry_topic=topic))
+
+    def drive(begin, end, other_m, from_m=0.0):
+        for k in range(begin, end):
+            # The second one tells of the time half a step later.
+            for x, half in ((from_m + 0.01 * k, 0), (from_m + 0.01 * k + other_m, 1)):
+                stamp_ns, seven = BEGIN_NS + (2 * k + half) * 10_000_000, (x, 0, 0, 0, 0, 0, 1)
+                if topic:
+                    robot.odometry.note_pose("odom", "base_link", stamp_ns, seven)
+                else:
+                    robot.odometry.note_transform("odom", "base_link", stamp_ns, seven, is_static=False)
+
+    drive(0, 50, 0.0)
+    drive(50, 100, 0.0, from_m=10.0)
+    assert robot.odometry.contradictions("lidar") == []
+    drive(100, 110, 5.0, from_m=10.0)
+    assert robot.odometry.contradictions("lidar") == ["frame 'base_link' jumps to and fro in 'odom': do two publishers tell of it?"]
+    drive(110, 700, 0.0, from_m=10.0)
+    assert robot.odometry.contradictions("lidar") == []
+
+
 def test_changes_that_nobody_asks_for_take_no_more_than_the_voxels():
     copied = VoxelSet()
     copied.take(State([[5, 5, 5]]))
