@@ -10,6 +10,7 @@ pub mod output;
 pub mod parse;
 mod plan;
 mod points;
+mod poses_by_time;
 pub mod runtime;
 mod scan_reader;
 mod serve;
