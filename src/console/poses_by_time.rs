@@ -1,5 +1,5 @@
-//! Poses by time: of scans that are named by times, between the lines of a file that are times too, as the RGB-D sets of
-//! TUM have them.
+//! Poses by time: of scans that are named by times, between the lines of a file that are times too, as the RGB-D sets
+//! of TUM have them.
 
 use std::path::{Path, PathBuf};
 
