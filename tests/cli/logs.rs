@@ -139,6 +139,16 @@ fn a_log_becomes_a_map_and_the_same_one_on_a_server() {
     let place = &here[0]["map_from_sensor"];
     assert_eq!(objects(&late)[0]["map_from_sensor"], *place);
     assert!(place["translation_m"][0].as_f64().unwrap() > 0.05, "{place}");
+    // A map that has the log already, as `mrol map` made it, does not take it from where it ended.
+    let file = format!("{}.mrol", log.path);
+    objects(&[&["map", &log.path, "--out", &file], &SETTINGS[..]].concat());
+    objects(&["restore", &file, "--map", "e", "--server", &server.grpc]);
+    let twice = ["insert", &log.path, "--map", "e", "--robot", "mrol", "--server", &server.grpc];
+    let refused = mrol(&twice).assert().code(1);
+    let refused = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(refused.contains("has scans of robot mrol up to") && refused.contains("--robot"), "{refused}");
+    let told = mrol(&[&twice[..], &["--session", "again", "--to", "0.1"]].concat()).output().unwrap();
+    assert!(!String::from_utf8_lossy(&told.stderr).contains("has scans of robot"), "{told:?}");
     // As fast as it was recorded: never faster, and the same map.
     let played = [&insert[..3], &["c"], &insert[4..], &["--create", "--real-time"], &SETTINGS].concat();
     let begin = Instant::now();

@@ -35,12 +35,14 @@ impl Insert {
         self.survey(&client, &[], &output).await?;
         // Who may only insert is not told.
         let begins_map = client.map_info(&self.map.name).await.is_ok_and(|info| info.is_empty());
+        let sent = self.sent_before(&client, &session).await;
         let mut sending = LogSending {
             insert: self,
             client: &client,
             path,
             begins_map,
-            done_ns: self.last_inserted_ns(&client, &session).await,
+            done_ns: sent.done_ns,
+            elsewhere_ns: sent.elsewhere_ns,
             session,
             odometer: Odometer::default(),
             counted: Answers::default(),
@@ -63,12 +65,20 @@ impl Insert {
         sending.counted.result()
     }
 
-    /// The stamp of the log's last scan that the map keeps, which an earlier start of this command sent.
-    async fn last_inserted_ns(&self, client: &Client, session: &SessionName) -> Option<i64> {
+    /// What the map has of this robot.
+    async fn sent_before(&self, client: &Client, session: &SessionName) -> SentBefore {
         // Who may only insert is not told: the server then answers scans again that it has.
-        let trajectory = client.trajectory(&self.map.name, Some(&self.robot)).await.ok()?;
-        let of_log = trajectory.poses.iter().rev().find(|pose| pose.session == *session);
-        of_log.and_then(|pose| pose.timestamp_ns)
+        let Ok(trajectory) = client.trajectory(&self.map.name, Some(&self.robot)).await else {
+            return SentBefore::default();
+        };
+        let (of_log, others): (Vec<_>, Vec<_>) =
+            trajectory.poses.iter().partition(|pose| pose.session == *session);
+        let is_told = self.session.is_some() || self.guess.is_some();
+        let elsewhere_ns = others.iter().filter_map(|pose| pose.timestamp_ns).max();
+        SentBefore {
+            done_ns: of_log.last().and_then(|pose| pose.timestamp_ns),
+            elsewhere_ns: elsewhere_ns.filter(|_| !is_told),
+        }
     }
 
     fn refuse_options_of_files(&self) -> Result<(), CliError> {
@@ -98,6 +108,15 @@ fn read(
     Ok(())
 }
 
+/// What a map has of a robot before a log of it is sent.
+#[derive(Debug, Clone, Copy, Default)]
+struct SentBefore {
+    /// The stamp of the log's last scan that the map keeps, which an earlier start of this command sent.
+    done_ns: Option<i64>,
+    /// The stamp of the last scan of another session.
+    elsewhere_ns: Option<i64>,
+}
+
 /// The scans of a log on their way.
 struct LogSending<'a> {
     insert: &'a Insert,
@@ -106,6 +125,8 @@ struct LogSending<'a> {
     /// True where the map was empty before the log's first scan.
     begins_map: bool,
     session: SessionName,
+    /// The robot's last scan in the map that is of another session; none where options say what to make of it.
+    elsewhere_ns: Option<i64>,
     /// Scans up to the one of this stamp, in the order of the log, were sent by an earlier start of the command; none
     /// once it was met.
     done_ns: Option<i64>,
@@ -133,6 +154,9 @@ impl LogSending<'_> {
                 self.output.note(format!("the cloud of {} has no return", name_of_stamp(scan.stamp_ns)));
                 continue;
             }
+            if is_first {
+                self.check_is_later(&scan)?;
+            }
             let request = self.request(&mut scan, is_first)?;
             if let Some(pace) = &mut self.pace {
                 pace.wait(scan.stamp_ns).await;
@@ -158,6 +182,23 @@ impl LogSending<'_> {
             ))),
             _ => Ok(()),
         }
+    }
+
+    /// Refuses a log that begins before the robot's last scan in the map: that says nothing of where it begins.
+    fn check_is_later(&self, first: &LoggedScan) -> Result<(), CliError> {
+        let Some(last_ns) = self.elsewhere_ns.filter(|last_ns| *last_ns >= first.stamp_ns) else {
+            return Ok(());
+        };
+        let Insert { map, robot, .. } = self.insert;
+        Err(CliError::failed(format!(
+            "{}: its first cloud is of {}, and map {} has scans of robot {robot} up to {}: if they are of this log, the map \
+             has it already; if they are another robot's, give this one another name by --robot; else say by --guess \
+             where the log begins",
+            self.path.display(),
+            name_of_stamp(first.stamp_ns),
+            map.name,
+            name_of_stamp(last_ns)
+        )))
     }
 
     fn request(&self, scan: &mut LoggedScan, is_first: bool) -> Result<ScanRequest, CliError> {
