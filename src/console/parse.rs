@@ -79,7 +79,11 @@ pub fn sphere(text: &str) -> Result<Sphere, String> {
 
 /// Parses a band of height "z z": lowest and highest, meters.
 pub fn band(text: &str) -> Result<[f64; 2], String> {
-    numbers(text, "z z")
+    let [lowest, highest] = numbers(text, "z z")?;
+    match lowest <= highest {
+        true => Ok([lowest, highest]),
+        false => Err(format!("the lowest height comes first, got {lowest} and {highest}")),
+    }
 }
 
 /// Parses a rectangle "x y x y": smallest and largest corner, meters.

@@ -109,7 +109,8 @@ impl LogOptions {
             None => Ok(default_ns),
             Some(seconds) if seconds.abs() <= SECONDS_MAX => Ok((seconds * 1e9).round() as i64),
             Some(seconds) => Err(CliError::usage(format!(
-                "{option} must be a number of seconds within {SECONDS_MAX}, got {seconds}"
+                "{option} must be a number of seconds within {SECONDS_MAX}, got {seconds}; --from and --to count from the \
+                 first cloud"
             ))),
         };
         let defaults = SequenceOptions::default();

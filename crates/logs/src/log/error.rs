@@ -7,7 +7,10 @@ use std::io;
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file is no log of this format.
-    #[error("this is no MCAP file: it begins with {0:02x?}")]
+    #[error(
+        "this is no MCAP file: it begins with {0:02x?}. A log is an .mcap or .db3 file, or the folder that `ros2 bag \
+         record` made"
+    )]
     NoMcap(Vec<u8>),
     /// The file is no database of ROS 2.
     #[error("this is no database of ROS 2: {0}")]

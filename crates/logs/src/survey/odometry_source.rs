@@ -58,8 +58,9 @@ impl OdometrySource {
                 let topics = odometry_topics(survey)
                     .map(|(_, summary)| excerpt(&summary.topic.name))
                     .take(TOPICS_LISTED);
-                let there =
-                    [topics.collect::<Vec<_>>().join(" "), survey.frames.listed()].join(" and frames ");
+                let topics = topics.collect::<Vec<_>>();
+                let topics = if topics.is_empty() { "no topics".to_owned() } else { topics.join(" ") };
+                let there = format!("{topics} of odometry, and frames {}", survey.frames.listed());
                 return Err(ChoiceError::NoSuchOdometry { asked: asked.to_owned(), there });
             }
         };
