@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 from rclpy.executors import Executor
@@ -15,12 +15,17 @@ FAILED_PAUSE_S = 0.1
 """How long nothing is done after a callback has failed."""
 
 
-def spin(executor: Executor, failed: Callable[[Exception], None]) -> None:
-    """Runs callbacks until the executor is shut down; `failed` is told of one that raises, and the others go on."""
+def spin(executor: Executor, failed: Callable[[Exception], None], ended: Event) -> None:
+    """Runs callbacks until the executor is shut down; `failed` is told of one that raises, and the others go on.
+
+    A callback under which the executor is shut down may raise as well, which is no defect: `ended` is set before that.
+    """
     while True:
         try:
             executor.spin()
         except Exception as error:
+            if ended.is_set():
+                return
             failed(error)
             time.sleep(FAILED_PAUSE_S)
         else:

@@ -379,7 +379,7 @@ def main() -> None:
         sys.exit(f"mrol_ros: {shown(str(error))}")
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    spinning = Thread(target=spin, args=(executor, node.callback_failed), daemon=True)
+    spinning = Thread(target=spin, args=(executor, node.callback_failed, ended), daemon=True)
     spinning.start()
     while not ended.wait(SIGNAL_S):
         # A signal that the system gave to another thread wakes nobody up, and is seen by this one when it wakes.
