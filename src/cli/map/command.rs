@@ -202,8 +202,10 @@ impl Map {
         }
         // Of a folder each file of poses is read.
         let in_poses = |path: &Path| {
-            let folder = path.parent().and_then(|folder| folder.canonicalize().ok());
-            path.exists() && poses.is_some_and(|poses| poses.canonicalize().ok() == folder)
+            let (Ok(path), Some(Ok(poses))) = (path.canonicalize(), poses.map(Path::canonicalize)) else {
+                return false;
+            };
+            path.parent() == Some(poses.as_path())
         };
         if let Some(path) = self.trajectory_out.as_deref().filter(|path| in_poses(path)) {
             let path = path.display();
