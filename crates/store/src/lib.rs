@@ -2,8 +2,8 @@
 //!
 //! Every change of a map is a record in its *journal* before it is visible. *Snapshots* of the whole map are written
 //! now and then while the server runs, so that a start reads the newest snapshot and the journal after it. Reading
-//! order: [`DataDir`] is the folder of a server, [`MapFolder`] that of a map, [`Snapshot`] and [`Journal`] the files in
-//! it, [`FileSystem`] the operations that they need.
+//! order: [`DataDir`] is the folder of a server, [`MapFolder`] that of a map, [`Snapshot`] and [`SegmentedJournal`] the
+//! files in it, [`FileSystem`] the operations that they need.
 //!
 //! Guarantees, after `kill -9` of the server, a crash of the machine, or a loss of power:
 //!
@@ -41,10 +41,12 @@ pub use data_folder::{DataDir, DataDirContents};
 pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{
-    Changes, Cut, JOURNAL_VERSION, Journal, JournalUse, RECORD_BYTES_MAX, Record, Recovered, Revised,
-    SegmentedJournal, StoredRecord, StoredRecords, VoxelMention,
+    Changes, Cut, JOURNAL_VERSION, JournalUse, RECORD_BYTES_MAX, ReceivedRecord, Record, Recovered, Revised,
+    SegmentedJournal, StoredRecord, StoredRecords, VoxelMention, frames_of, read_frames,
 };
-pub use map_files::{FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin};
+pub use map_files::{
+    FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin, check_replayed,
+};
 pub use mode::{StoreMode, StoreModeError};
 pub use progress::{Opened, OpeningProgress};
 pub use settings::{Durability, DurabilityError, StoreSettings};

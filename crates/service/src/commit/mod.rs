@@ -10,6 +10,9 @@
 //!                             publish, acknowledge
 //! ```
 //!
+//! Of a map that several nodes share, the log that they share takes the place of the sync: `among_nodes` puts a group
+//! into it, and makes what the other nodes put there. `histories` tries that on logs that fail.
+//!
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
 //! before it is applied and nothing after it has begun.
 //!
@@ -17,8 +20,11 @@
 //! which all maps share, takes it out, and the map's `worker` journals it, applies it and publishes it to
 //! [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn comes.
 
+mod among_nodes;
 mod commit_queue;
 mod commit_threads;
+#[cfg(test)]
+mod histories;
 mod recent_changes;
 mod scan_turn;
 mod stop;
@@ -32,6 +38,6 @@ pub(crate) use commit_threads::CommitThreads;
 pub(crate) use recent_changes::{RecentChanges, WatchedLevel};
 pub(crate) use scan_turn::TurnLimits;
 pub(crate) use stop::Stop;
-pub(crate) use submission::{Decided, Prepared, Refusal, RobotLock, Step, Submission, record_of};
+pub(crate) use submission::{Decided, Prepared, Refusal, RobotLock, SharedAct, Step, Submission, record_of};
 pub(crate) use watched_change::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, has_looked_into};
 pub(crate) use worker::Published;

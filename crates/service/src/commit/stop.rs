@@ -1,14 +1,22 @@
 //! Why a map takes no more changes, and what its callers are told then.
 
+use std::time::Duration;
+
 use crate::error::{Reason, ServiceError};
+use crate::replication::NodeName;
 use mrol_map::map::{MapName, REVISION_MAX};
 use mrol_store::StoreError;
+
+/// When to try again where a node is to take over, or the log to answer.
+const LEADER_SOON: Duration = Duration::from_secs(2);
 
 /// Why a map takes no more changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Stop {
     /// The map's journal could not be written: what the disk holds is unknown.
     Failed(String),
+    /// Several nodes share the map, and this one has another history of it than their log.
+    Diverged(String),
     /// The map was deleted.
     Deleted,
     /// Another has its name now.
@@ -27,6 +35,10 @@ impl Stop {
                      is well"
                 );
                 ServiceError::new(Reason::MapReadOnly, message)
+            }
+            Self::Diverged(how) => {
+                let message = format!("map {name} is not served by this node: {how}");
+                ServiceError::new(Reason::HistoriesDiffer, message)
             }
             Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
             Self::Replaced => {
@@ -57,4 +69,29 @@ pub(super) fn revisions_used_up(name: &MapName) -> ServiceError {
         "map {name} is at revision {REVISION_MAX}, the last that there is: make another map, and insert there"
     );
     ServiceError::new(Reason::RevisionsUsedUp, message)
+}
+
+/// What to say to whose change another node has to make.
+pub(super) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceError {
+    let message = match leader {
+        Some(leader) => format!("node {leader} makes the changes of map {name}: ask there"),
+        None => format!("no node has taken over map {name} yet: try again"),
+    };
+    ServiceError::new(Reason::NotLeader, message).retry_after(LEADER_SOON)
+}
+
+/// What to say where the log of a map does not answer: nothing was changed.
+pub(super) fn no_quorum(name: &MapName, reason: &str) -> ServiceError {
+    let message =
+        format!("the log of map {name} acknowledges nothing ({reason}): nothing was changed, try again");
+    ServiceError::new(Reason::NoQuorum, message).retry_after(LEADER_SOON)
+}
+
+/// What to say to whose change was handed to a log that did not answer.
+pub(super) fn not_acknowledged(name: &MapName, reason: &str) -> ServiceError {
+    let message = format!(
+        "the log of map {name} did not acknowledge this change ({reason}): it may be there, now or later; the same scan_id or \
+         request_id, sent again, tells"
+    );
+    ServiceError::new(Reason::OutcomeUnknown, message).retry_after(LEADER_SOON)
 }

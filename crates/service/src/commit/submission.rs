@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use tokio::sync::{OwnedMutexGuard, oneshot};
+use uuid::Uuid;
 
 use super::scan_turn::TurnLimits;
 use crate::error::{Reason, ServiceError};
+use crate::replication::{Base, NodeName, ReplicatedLog};
 use crate::resources::Reservation;
 use crate::work::{Requester, Share};
 use mrol_map::map::{Change, Committed, MultiResolutionMap};
@@ -36,6 +38,24 @@ pub(crate) enum Submission {
     Prepared(Box<Prepared>),
     /// To be decided on.
     Undecided(Decision),
+    /// What a node does about a map that several share. It is answered with the map's newest revision.
+    Shared(SharedAct),
+}
+
+/// What a node does about a map that several share.
+#[derive(Debug)]
+pub(crate) enum SharedAct {
+    /// Begins to share the map `map`, as `node`.
+    Join { log: Arc<dyn ReplicatedLog>, node: NodeName, map: Uuid },
+    /// Makes what the log has.
+    Follow,
+    /// Takes over, where no live node is ahead of this one: those nodes, with the revisions that they are at.
+    Lead(Vec<(NodeName, u64)>),
+    /// Gives the lead to another node.
+    HandOver(NodeName),
+    /// Tells where another node can begin to read, with a copy of this node's map as it is now or later; none where that
+    /// would be in the middle of a change.
+    Base(oneshot::Sender<Option<Base>>),
 }
 
 /// A change that is known before its turn comes.
@@ -53,7 +73,7 @@ pub(crate) struct Prepared {
 }
 
 /// Why a change was not made.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) enum Refusal {
     /// The map has changed since it was decided on: decide again.
     Stale,

@@ -64,7 +64,7 @@ impl Turns {
             Submission::Prepared(prepared) => {
                 Some(prepared.change.touched().into_iter().map(|set| set.len()).sum())
             }
-            Submission::Undecided(_) => None,
+            Submission::Undecided(_) | Submission::Shared(_) => None,
         };
         let size = voxels.unwrap_or(LARGE_CHANGE_VOXELS).min(LARGE_CHANGE_VOXELS) as u64;
         let extra = TURN * size / LARGE_CHANGE_VOXELS as u64;

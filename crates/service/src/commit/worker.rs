@@ -13,6 +13,7 @@ use super::submission::{
 };
 use super::watched_change::WatchedChange;
 use crate::error::ServiceError;
+use crate::replication::Member;
 use crate::resources::Reservation;
 use mrol_map::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use mrol_map::util::{SharedDurations, StopSignal};
@@ -20,6 +21,8 @@ use mrol_store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 
 /// Changes that share one sync, at most.
 pub(super) const GROUP_MAX: usize = 256;
+/// How long a node may leave unsynced what the log of several nodes holds.
+const SHARED_SYNC_INTERVAL: Duration = Duration::from_secs(1);
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
 
@@ -33,11 +36,13 @@ pub(crate) struct Published {
 
 /// What the changes of a map are made with, by one thread at a time.
 pub(super) struct Worker {
-    name: MapName,
-    map: Arc<MultiResolutionMap>,
-    folder: Option<Arc<MapFolder>>,
-    published: Published,
-    stopped: Arc<OnceLock<Stop>>,
+    pub(super) name: MapName,
+    pub(super) map: Arc<MultiResolutionMap>,
+    pub(super) folder: Option<Arc<MapFolder>>,
+    pub(super) published: Published,
+    /// Its part in the log that several nodes share; none of a map that is this server's alone.
+    pub(super) member: Option<Member>,
+    pub(super) stopped: Arc<OnceLock<Stop>>,
     durations: Arc<SharedDurations>,
     settings: StoreSettings,
     /// Since when something waits to be synced at an interval.
@@ -69,7 +74,8 @@ impl Worker {
     ) -> Self {
         let thinned = map.revision();
         let settings = settings.clone();
-        Self { name, map, folder, published, stopped, durations, settings, unsynced: None, thinned }
+        let (member, unsynced) = (None, None);
+        Self { name, map, folder, published, member, stopped, durations, settings, unsynced, thinned }
     }
 
     /// Makes the changes that wait, in order; a run of known ones shares one sync.
@@ -98,6 +104,10 @@ impl Worker {
                     self.commit_group(&mut group);
                     self.decide(decide, answer, &mut group);
                     self.commit_group(&mut group);
+                }
+                Submission::Shared(act) => {
+                    self.commit_group(&mut group);
+                    drop(answer.send(self.act(act).map_err(Refusal::Failed)));
                 }
             }
         }
@@ -143,44 +153,80 @@ impl Worker {
         }
     }
 
-    /// Durable, then visible, then acknowledged.
+    /// Durable, then visible, then acknowledged: first the changes of a group are put in order, then they are made.
     fn commit_group(&mut self, group: &mut Vec<Pending>) {
         let left = usize::try_from(REVISION_MAX.saturating_sub(self.map.revision())).unwrap_or(usize::MAX);
         for Pending { answer, .. } in group.drain(left.min(group.len())..) {
             drop(answer.send(Err(Refusal::Failed(revisions_used_up(&self.name)))));
         }
-        if group.is_empty() {
-            return;
-        }
-        let begin = Instant::now();
-        if let Err(error) = self.journal(group) {
-            for Pending { answer, .. } in group.drain(..) {
-                drop(answer.send(Err(Refusal::Failed(error.clone()))));
+        while !group.is_empty() {
+            let begin = Instant::now();
+            match self.order(group) {
+                Ok(ordered) => self.make(group.drain(..ordered), begin),
+                Err(refusal) => {
+                    for Pending { answer, .. } in group.drain(..) {
+                        drop(answer.send(Err(refusal.clone())));
+                    }
+                }
             }
-            return;
         }
-        let last = group.len() - 1;
-        for (k, Pending { change, answer, .. }) in group.drain(..).enumerate() {
-            let Published { announced, recent } = &self.published;
-            let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
-            debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
-            announced.send_replace(committed.revision);
-            // Counted before the last one hears of it, so that whoever was answered finds its commit in the metrics.
-            if k == last {
-                self.durations.record(begin.elapsed());
-            }
-            drop(answer.send(Ok(committed)));
-            let change = WatchedChange::of(committed.revision, Some(committed.hash), change, levels);
-            recent.push(change, self.map.state_hash());
+    }
+
+    /// Puts the first changes of a group behind all that were made, durably; returns how many.
+    fn order(&mut self, group: &[Pending]) -> Result<usize, Refusal> {
+        if let Some(stop) = self.stopped.get() {
+            return Err(Refusal::Failed(stop.refusal(&self.name)));
+        }
+        let records: Vec<&Record> = group.iter().filter_map(|pending| pending.record.as_ref()).collect();
+        if self.member.is_some() {
+            debug_assert_eq!(
+                records.len(),
+                group.len(),
+                "a map that nodes share has a folder, and so records"
+            );
+            return self.order_among_nodes(&records);
+        }
+        self.append(&records)?;
+        if let Some(folder) = self.folder.as_ref().filter(|it| it.settings().durability == Durability::Always)
+        {
+            folder.sync().map_err(|error| self.lost_track(&error))?;
+        }
+        Ok(group.len())
+    }
+
+    /// Makes changes that are in order: visible, then acknowledged.
+    fn make(&mut self, ordered: std::vec::Drain<'_, Pending>, begin: Instant) {
+        let last = ordered.len().saturating_sub(1);
+        for (k, Pending { change, answer, .. }) in ordered.enumerate() {
+            let durations = Arc::clone(&self.durations);
+            self.apply(change, |committed| {
+                // Counted before the last one hears of it, so that whoever was answered finds its commit in the metrics.
+                if k == last {
+                    durations.record(begin.elapsed());
+                }
+                drop(answer.send(Ok(committed)));
+            });
         }
         self.note_durable();
         self.thin_in_memory();
     }
 
-    /// Tells the map's watchers how far it is durable.
-    fn note_durable(&self) {
+    /// Applies a change and publishes it; `acknowledge` is told in between.
+    pub(super) fn apply(&self, change: Change, acknowledge: impl FnOnce(Committed)) {
+        let Published { announced, recent } = &self.published;
+        let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
+        debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
+        announced.send_replace(committed.revision);
+        acknowledge(committed);
+        let change = WatchedChange::of(committed.revision, Some(committed.hash), change, levels);
+        recent.push(change, self.map.state_hash());
+    }
+
+    /// Tells the map's watchers how far it is durable: what is in a log that nodes share is.
+    pub(super) fn note_durable(&self) {
         let visible = self.map.revision();
-        let durable = self.folder.as_ref().map_or(visible, |folder| folder.used().durable.min(visible));
+        let own_folder = self.folder.as_ref().filter(|_| self.member.is_none());
+        let durable = own_folder.map_or(visible, |folder| folder.used().durable.min(visible));
         self.published.recent.note_durable(durable);
     }
 
@@ -195,31 +241,24 @@ impl Worker {
         }
     }
 
-    /// Appends a group and, where that is asked for, syncs it.
-    fn journal(&mut self, group: &[Pending]) -> Result<(), ServiceError> {
-        if let Some(stop) = self.stopped.get() {
-            return Err(stop.refusal(&self.name));
-        }
+    /// Appends records to the journal, where there is one.
+    pub(super) fn append(&mut self, records: &[&Record]) -> Result<(), ServiceError> {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
-        let records: Vec<&Record> = group.iter().filter_map(|pending| pending.record.as_ref()).collect();
-        folder.append(&records).map_err(|error| match error {
+        folder.append(records).map_err(|error| match error {
             // Nothing was written.
             StoreError::JournalStopped(_) | StoreError::Gone | StoreError::RevisionsUsedUp(_) => {
                 self.stop(&error)
             }
             error => self.lost_track(&error),
         })?;
-        if folder.settings().durability == Durability::Always {
-            folder.sync().map_err(|error| self.lost_track(&error))?;
-        }
         self.unsynced.get_or_insert_with(Instant::now);
         Ok(())
     }
 
     /// Changes were handed to the journal, and nobody knows what became of them.
-    fn lost_track(&self, error: &StoreError) -> ServiceError {
+    pub(super) fn lost_track(&self, error: &StoreError) -> ServiceError {
         self.stop(error);
         outcome_unknown(&self.name, error)
     }
@@ -235,8 +274,11 @@ impl Worker {
 
     /// How long until what was written is to be synced.
     fn until_sync(&self) -> Option<Duration> {
-        let Durability::Interval(interval) = self.folder.as_ref()?.settings().durability else {
-            return None;
+        let interval = match self.folder.as_ref()?.settings().durability {
+            Durability::Interval(interval) => interval,
+            // The log has it; the folder is what a node need not read again.
+            Durability::Always if self.member.is_some() => SHARED_SYNC_INTERVAL,
+            Durability::Always => return None,
         };
         Some(interval.saturating_sub(self.unsynced?.elapsed()))
     }

@@ -160,6 +160,7 @@ reasons! {
         GuessRequired "guess_required" Both: "the robot has no accepted scan here, the map is not empty, and there is no guess", "give `guess`, or use `localize` first";
         MapEmpty "map_empty" Both: "the map has nothing to localize in", "insert a scan first";
         MapReplaced "map_replaced" Both: "the map is another one by now", "read its `map_uuid` and start again";
+        MapShared "map_shared" Both: "several nodes share the map: it is not renamed or replaced on one of them", "make another map, or restore it under another name";
         NoFloor "no_floor" Both: "a grid's band counts from the floor, and the map has no poses of sensors or no floor below them", "give `band_from` `map`, and heights from z = 0 of the map";
         NoJournal "no_journal" Both: "the server keeps maps in memory only; undo and the list of observers need a journal", "start it with `--data-dir`";
         NotUndoable "not_undoable" Both: "the revision was made by an undo or a keep-out, or what it made was undone already", "send what was undone again, or delete it again; put or delete the keep-out again";
@@ -198,9 +199,12 @@ reasons! {
     Unavailable {
         CatalogBusy "catalog_busy" Both: "a map has been made, replaced, renamed, deleted or opened for long: it is large, or its disk slow", "retry as told";
         Draining "draining" Both: "the server is going down", "retry elsewhere or later";
+        HistoriesDiffer "histories_differ" Both: "several nodes share the map, and this one has another history of it; the message names the revision", "ask another node; decide which history stays";
         MapReadOnly "map_read_only" Both: "the map's journal failed; it answers queries and takes no changes", "mend the disk, restart the server";
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";
-        OutcomeUnknown "outcome_unknown" Both: "the journal failed while this change was written: it may be there after the restart", "send the same `scan_id` or `request_id` again then";
+        NoQuorum "no_quorum" Both: "several nodes share the map, and their log acknowledges nothing; nothing was changed", "retry as told";
+        NotLeader "not_leader" Both: "several nodes share the map, and another one, or none yet, makes its changes", "retry as told, there or here";
+        OutcomeUnknown "outcome_unknown" Both: "the journal failed while this change was written, or the log of several nodes did not acknowledge it: it may be there after the restart, now or later", "send the same `scan_id` or `request_id` again then";
         ReplicaStale "replica_stale" Client: "the replica heard its server longer ago than `age_max` allows", "ask the server, or wait until the replica is connected";
         Starting "starting" Http: "maps are being looked for", "wait; `/readyz` tells how far it is";
     }

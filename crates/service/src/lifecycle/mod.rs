@@ -1,7 +1,9 @@
-//! Operations on maps as a whole: they are made, described, listed, deleted and saved, as map files too.
+//! Operations on maps as a whole: they are made, described, listed, deleted and saved, as map files too, and shared with
+//! other nodes.
 
 mod map_file;
 mod operations;
+mod sharing;
 
 #[cfg(test)]
 pub(crate) use map_file::from_file;

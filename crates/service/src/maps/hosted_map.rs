@@ -1,6 +1,6 @@
 //! A map under a name: what the service keeps about it besides the map itself.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -38,6 +38,8 @@ pub(crate) struct HostedMap {
     pub(super) snapshots: Snapshots,
     pub(crate) keep_out_expiry: KeepOutExpiry,
     last_use: LastUse,
+    /// True once other nodes share it: it is kept in memory, under its name.
+    is_shared: AtomicBool,
 }
 
 /// What is left of a map that was closed.
@@ -136,7 +138,23 @@ impl HostedMap {
             snapshots: Snapshots::default(),
             keep_out_expiry: KeepOutExpiry::default(),
             last_use: LastUse { opened: Instant::now(), at_ms: AtomicU64::new(0) },
+            is_shared: AtomicBool::default(),
         }
+    }
+
+    /// Notes that other nodes share the map.
+    pub(crate) fn note_shared(&self) {
+        self.is_shared.store(true, Ordering::Release);
+    }
+
+    /// Refuses what would take a map that nodes share away from its log.
+    pub(super) fn check_not_shared(&self) -> Result<(), ServiceError> {
+        if !self.is_shared.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let message =
+            format!("several nodes share map {}: it is not renamed or replaced on one of them", self.name);
+        Err(ServiceError::new(Reason::MapShared, message))
     }
 
     /// Notes that somebody asks for the map.
@@ -152,10 +170,11 @@ impl HostedMap {
         opened.elapsed().saturating_sub(last) >= duration
     }
 
-    /// True where the map is at `revision`, and nobody but its worker uses its files.
+    /// True where the map is at `revision`, no other node shares it, and nobody but its worker uses its files.
     pub(super) fn may_close(&self, revision: u64) -> bool {
         const OWN: usize = 2;
-        self.map.revision() == revision && self.folder.as_ref().is_some_and(|it| Arc::strong_count(it) == OWN)
+        let is_at_rest = self.map.revision() == revision && !self.is_shared.load(Ordering::Acquire);
+        is_at_rest && self.folder.as_ref().is_some_and(|it| Arc::strong_count(it) == OWN)
     }
 
     /// Takes the map out of service. Its files are closed on a thread for commits.
@@ -261,7 +280,7 @@ impl HostedMap {
     /// Why the map takes no changes.
     pub(crate) fn failure(&self) -> Option<&str> {
         match self.commit_queue.stopped()? {
-            Stop::Failed(reason) => Some(reason),
+            Stop::Failed(reason) | Stop::Diverged(reason) => Some(reason),
             Stop::Deleted | Stop::Replaced | Stop::Renamed => None,
         }
     }

@@ -24,6 +24,7 @@ impl Catalog {
         self.check_name_free(to)?;
         let _writing = self.turn_to_write().await?;
         let old = self.get(name, asker).await?;
+        old.check_not_shared()?;
         self.check_name_free(to)?;
         let (data_dir, to, settings) = (self.data_dir.clone(), to.name().clone(), self.settings.clone());
         let (threads, catalog) = (Arc::clone(&self.commit_threads), Arc::clone(self));

@@ -19,6 +19,7 @@ impl Catalog {
         uuid: Uuid,
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
+        old.check_not_shared()?;
         let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
         let threads = Arc::clone(&self.commit_threads);
         let taken: Vec<MapName> = self.maps.read().taken().cloned().collect();

@@ -43,6 +43,11 @@ impl Record {
         self.payload.len()
     }
 
+    /// CRC-32C of the payload: tells two records of one revision apart.
+    pub fn checksum(&self) -> u32 {
+        self.checksum
+    }
+
     /// Returns false: a record has at least its kind.
     pub fn is_empty(&self) -> bool {
         self.payload.is_empty()

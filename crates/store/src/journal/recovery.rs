@@ -191,7 +191,6 @@ impl Segment<'_> {
 mod tests {
     use super::*;
     use crate::file_system::Disk;
-    use crate::journal::log::Journal;
     use crate::journal::record::Record;
     use crate::settings::StoreSettings;
     use mrol_map::geometry::Pose;

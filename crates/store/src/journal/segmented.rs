@@ -8,7 +8,7 @@ use std::time::Instant;
 use uuid::Uuid;
 
 use super::frame::{self, Frame};
-use super::log::{Changes, Journal, StoredRecords};
+use super::reading::{Changes, StoredRecords};
 use super::record::Record;
 use super::segment::{self, Frames};
 use crate::codec::Unreadable;
@@ -102,10 +102,57 @@ impl SegmentedJournal {
         &self.place
     }
 
+    /// Appends records, which get the revisions after the head, and returns the new head. They are durable after the
+    /// next [`Self::sync`], so that one sync serves all waiters.
+    ///
+    /// # Errors
+    /// When they cannot be written. The journal then accepts nothing more.
+    pub fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
+        // Refused before anything is written, so the journal goes on.
+        if records.len() as u64 > REVISION_MAX.saturating_sub(self.head) {
+            return Err(StoreError::RevisionsUsedUp(self.head));
+        }
+        self.or_stop(|journal| journal.write(records))
+    }
+
+    /// Makes everything appended so far durable.
+    ///
+    /// # Errors
+    /// When that is not certain. The journal then accepts nothing more and is not synced again: the system may have
+    /// dropped what it could not write.
+    pub fn sync(&mut self) -> Result<(), StoreError> {
+        self.or_stop(Self::sync_active)
+    }
+
+    /// Returns the last revision that was appended.
+    pub fn head(&self) -> u64 {
+        self.head
+    }
+
+    /// Reads the changes from `revision` to the present head; a revision that was removed is an error.
+    pub fn read_from(&self, revision: u64) -> Changes {
+        self.place.read_from(revision, &self.segments, self.head)
+    }
+
+    /// Removes changes before `revision`, as far as that is cheap.
+    ///
+    /// # Errors
+    /// When the system refuses; nothing else is removed then.
+    pub fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError> {
+        // A segment goes when the next one begins early enough.
+        while self.segments.get(1).is_some_and(|&next| next <= revision) {
+            let path = self.place.path(self.segments[0]);
+            self.place.files.remove(&path).map_err(StoreError::io(&path))?;
+            self.segments.remove(0);
+        }
+        let folder = self.place.folder.get();
+        self.place.files.sync(&folder).map_err(StoreError::io(&folder))
+    }
+
     /// Ends the present segment. The next record begins another, so that this one can be removed as a whole.
     ///
     /// # Errors
-    /// As for [`Journal::sync`].
+    /// As for [`Self::sync`].
     pub fn end_segment(&mut self) -> Result<(), StoreError> {
         self.sync()?;
         self.active = None;
@@ -166,39 +213,6 @@ impl SegmentedJournal {
     }
 }
 
-impl Journal for SegmentedJournal {
-    fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
-        // Refused before anything is written, so the journal goes on.
-        if records.len() as u64 > REVISION_MAX.saturating_sub(self.head) {
-            return Err(StoreError::RevisionsUsedUp(self.head));
-        }
-        self.or_stop(|journal| journal.write(records))
-    }
-
-    fn sync(&mut self) -> Result<(), StoreError> {
-        self.or_stop(Self::sync_active)
-    }
-
-    fn head(&self) -> u64 {
-        self.head
-    }
-
-    fn read_from(&self, revision: u64) -> Changes {
-        self.place.read_from(revision, &self.segments, self.head)
-    }
-
-    fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError> {
-        // A segment goes when the next one begins early enough.
-        while self.segments.get(1).is_some_and(|&next| next <= revision) {
-            let path = self.place.path(self.segments[0]);
-            self.place.files.remove(&path).map_err(StoreError::io(&path))?;
-            self.segments.remove(0);
-        }
-        let folder = self.place.folder.get();
-        self.place.files.sync(&folder).map_err(StoreError::io(&folder))
-    }
-}
-
 impl SegmentFolder {
     pub(super) fn path(&self, first: u64) -> PathBuf {
         self.folder.file(&segment::file_name(first))
@@ -208,6 +222,20 @@ impl SegmentFolder {
     pub(crate) fn read_from(&self, revision: u64, segments: &[u64], head: u64) -> Changes {
         let first = segments.partition_point(|&first| first <= revision).saturating_sub(1);
         Box::new(self.reader(revision, &segments[first..], head, |frame| frame.change()))
+    }
+
+    /// Reads the records from `revision` to `head` from the segments that begin with the revisions `segments`, as they
+    /// are.
+    pub(crate) fn records_from(&self, revision: u64, segments: &[u64], head: u64) -> StoredRecords {
+        let first = segments.partition_point(|&first| first <= revision).saturating_sub(1);
+        Box::new(
+            self.reader(
+                revision,
+                segments.get(first..).unwrap_or_default(),
+                head,
+                |frame| Ok(frame.stored()),
+            ),
+        )
     }
 
     /// Reads the records from `revision` to `head` of the segment that begins with revision `first`, as they are.

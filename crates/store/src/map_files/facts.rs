@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::retention::{self, UndoWindow};
 use super::snapshot_files::Sizes;
-use crate::journal::{Journal, JournalUse, SegmentedJournal};
+use crate::journal::{JournalUse, SegmentedJournal};
 use crate::settings::StoreSettings;
 use mrol_map::map::WithdrawnChange;
 use mrol_map::sync::{Mutex, MutexGuard, Rank};

@@ -1,4 +1,4 @@
-//! Reads the journal backwards, a segment at a time.
+//! Reads the journal: backwards, a segment at a time, or from a revision on.
 
 use super::map_folder::MapFolder;
 use crate::error::StoreError;
@@ -34,6 +34,12 @@ impl MapFolder {
     /// Reads the records of a part, ascending.
     pub fn records_of_part(&self, part: &JournalPart) -> StoredRecords {
         self.place.records_of(part.first, part.first, part.last)
+    }
+
+    /// Reads the records from `revision` on, ascending; a revision that is no longer kept is an error.
+    pub fn records_from(&self, revision: u64) -> StoredRecords {
+        let (segments, head) = self.facts.journal();
+        self.place.records_from(revision, &segments, head)
     }
 
     /// False once the segment of a part is not kept any more.

@@ -12,7 +12,7 @@ use super::snapshot_files::{Sizes, forget_damaged, snapshot_name, unneeded_parts
 use crate::error::StoreError;
 use crate::file_system::FileSystem;
 use crate::folder::{self, FolderPath};
-use crate::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
+use crate::journal::{Record, SegmentFolder, SegmentedJournal};
 use crate::settings::StoreSettings;
 use crate::snapshots::{self, Snapshot};
 use crate::viewpoint_parts::{ViewpointParts, part_names, section_of};
@@ -70,20 +70,20 @@ impl MapFolder {
         folder
     }
 
-    /// Appends records; see [`Journal::append`].
+    /// Appends records; see [`SegmentedJournal::append`].
     ///
     /// # Errors
-    /// As for [`Journal::append`]; `Gone` where the map was deleted.
+    /// As for [`SegmentedJournal::append`]; `Gone` where the map was deleted.
     pub fn append(&self, records: &[&Record]) -> Result<u64, StoreError> {
         self.in_journal(|journal| journal.append(records))
     }
 
-    /// Makes everything appended so far durable; see [`Journal::sync`].
+    /// Makes everything appended so far durable; see [`SegmentedJournal::sync`].
     ///
     /// # Errors
-    /// As for [`Journal::sync`]; `Gone` where the map was deleted.
+    /// As for [`SegmentedJournal::sync`]; `Gone` where the map was deleted.
     pub fn sync(&self) -> Result<(), StoreError> {
-        self.in_journal(Journal::sync)
+        self.in_journal(SegmentedJournal::sync)
     }
 
     /// Runs `act` on the journal, and updates the facts.

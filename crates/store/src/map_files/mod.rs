@@ -23,7 +23,7 @@ pub use facts::{FolderUse, Pin};
 pub use journal_parts::JournalPart;
 pub use map_folder::MapFolder;
 pub use observing::{NotObserved, Observed};
-pub use opening::OpenedMap;
+pub use opening::{OpenedMap, check_replayed};
 pub(crate) use snapshot_files::{
     bytes_to_read, newest_good, not_understood, set_aside_in, snapshot_name, snapshot_revisions,
 };

@@ -97,16 +97,9 @@ impl MapFolder {
         let map = MultiResolutionMap::restore_until(snapshot.settings, snapshot.contents, stop)
             .map_err(|e| StoreError::damaged(&path, e.to_string()))?
             .ok_or(StoreError::Cancelled)?;
-        let levels = map.settings().levels;
         let mut history = ContentHistory::of(map.content_version(), map.state_hash());
         let replay = |revision, change| {
-            // What a snapshot may not hold, no change may bring in.
-            if let Change::Insertion(scan) = &change {
-                scan.pose.check_levels(levels).map_err(|e| e.to_string())?;
-            }
-            if let Change::KeepOut(KeepOutRecord { change, .. }) = &change {
-                map.keep_outs().check_room_for(&change.name, KEEP_OUTS_MAX).map_err(|e| e.to_string())?;
-            }
+            check_replayed(&map, &change)?;
             let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);
             history.push(committed.version(), map.state_hash());
@@ -143,5 +136,19 @@ impl MapFolder {
             damaged_parts,
             not_understood,
         })
+    }
+}
+
+/// Checks a change that is about to be made again: what a snapshot may not hold, no change may bring in.
+///
+/// # Errors
+/// Says what the map may not hold.
+pub fn check_replayed(map: &MultiResolutionMap, change: &Change) -> Result<(), String> {
+    match change {
+        Change::Insertion(scan) => scan.pose.check_levels(map.settings().levels).map_err(|e| e.to_string()),
+        Change::KeepOut(KeepOutRecord { change, .. }) => {
+            map.keep_outs().check_room_for(&change.name, KEEP_OUTS_MAX).map_err(|e| e.to_string())
+        }
+        Change::Deletion(_) | Change::Undo(_) => Ok(()),
     }
 }

@@ -1,0 +1,87 @@
+//! Maps that several nodes share: what a node is told to do about one of them.
+
+use std::sync::Arc;
+
+use crate::commit::{Refusal, SharedAct, Submission};
+use crate::error::{Reason, ServiceError};
+use crate::map_service::{MapService, commit_thread_ended};
+use crate::replication::{Base, NodeName, ReplicatedLog};
+use crate::request::MapVersion;
+use crate::work::Requester;
+use mrol_map::map::MapName;
+use tokio::sync::oneshot;
+
+impl MapService {
+    /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it
+    /// makes what the log has, and takes changes only where it leads ([`MapService::lead_map`]). To be called before
+    /// anybody may change the map. It stays in memory, under its name, until the server ends.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map, `NoJournal` for one that is kept in memory only, `NoQuorum` where the log does not
+    /// answer, and `HistoriesDiffer` where the log has another history of the map than this server's folder.
+    pub async fn share_map(
+        &self,
+        name: &MapName,
+        log: Arc<dyn ReplicatedLog>,
+        node: NodeName,
+    ) -> Result<MapVersion, ServiceError> {
+        let map = self.map(name).await?;
+        if map.folder.is_none() {
+            return Err(map.no_journal("a map that nodes share"));
+        }
+        map.note_shared();
+        self.act_on(name, SharedAct::Join { log, node, map: map.uuid }).await
+    }
+
+    /// Makes what the log of a shared map has; to be called whenever it may have more.
+    ///
+    /// # Errors
+    /// As for [`MapService::share_map`].
+    pub async fn follow_map(&self, name: &MapName) -> Result<MapVersion, ServiceError> {
+        self.act_on(name, SharedAct::Follow).await
+    }
+
+    /// Takes the lead of a shared map over, and gives its log what only this node has. `live` are the other nodes that
+    /// are up, with the revisions that they are at: a node that is behind one of them does not take over.
+    ///
+    /// # Errors
+    /// As for [`MapService::share_map`]; `NotLeader` where another node was faster, `NoQuorum` where one is ahead.
+    pub async fn lead_map(
+        &self,
+        name: &MapName,
+        live: Vec<(NodeName, u64)>,
+    ) -> Result<MapVersion, ServiceError> {
+        self.act_on(name, SharedAct::Lead(live)).await
+    }
+
+    /// Gives the lead of a shared map to another node.
+    ///
+    /// # Errors
+    /// As for [`MapService::share_map`]; `NotLeader` where this node does not lead.
+    pub async fn hand_map_over(&self, name: &MapName, node: NodeName) -> Result<MapVersion, ServiceError> {
+        self.act_on(name, SharedAct::HandOver(node)).await
+    }
+
+    /// Where the log of a shared map can begin for a node that starts with a copy of this node's map, taken now or later;
+    /// none where the newest change is not whole yet.
+    ///
+    /// # Errors
+    /// As for [`MapService::share_map`].
+    pub async fn log_base(&self, name: &MapName) -> Result<Option<Base>, ServiceError> {
+        let (tell, told) = oneshot::channel();
+        self.act_on(name, SharedAct::Base(tell)).await?;
+        told.await.map_err(commit_thread_ended)
+    }
+
+    async fn act_on(&self, name: &MapName, act: SharedAct) -> Result<MapVersion, ServiceError> {
+        let map = self.map(name).await?;
+        let outcome = map.commit_queue.submit(&Requester::from(&self.asker), Submission::Shared(act))?;
+        match outcome.await.map_err(commit_thread_ended)? {
+            Ok(committed) => Ok(map.version(committed.version())),
+            Err(Refusal::Failed(error)) => Err(error),
+            Err(Refusal::Stale) => {
+                Err(ServiceError::new(Reason::NotLeader, "the map went on meanwhile: try again"))
+            }
+        }
+    }
+}
