@@ -7,7 +7,8 @@
 //! 1. `error`, `setting`, `limits`, `request`: how a request fails, what a setting is, how much a request may ask, what
 //!    it asks and how it is answered.
 //! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
-//! 3. `commit`: how changes of a map become durable, then visible, then acknowledged.
+//! 3. `replication`, `commit`: a log that several nodes share; how changes of a map become durable, then visible, then
+//!    acknowledged.
 //! 4. `maps`: the maps by name, and what a hosted map is made of.
 //! 5. `map_service`: [`MapService`], the handle of which every operation is a method.
 //! 6. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.

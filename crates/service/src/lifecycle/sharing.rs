@@ -2,16 +2,45 @@
 
 use std::sync::Arc;
 
+use bytes::Bytes;
+use tokio::sync::oneshot;
+use uuid::Uuid;
+
+use super::map_file::from_file;
 use crate::commit::{Refusal, SharedAct, Submission};
 use crate::error::{Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
+use crate::maps::BuiltMap;
 use crate::replication::{Base, NodeName, ReplicatedLog};
 use crate::request::MapVersion;
 use crate::work::Requester;
 use mrol_map::map::MapName;
-use tokio::sync::oneshot;
+use mrol_map::util::StopSignal;
 
 impl MapService {
+    /// Takes in a copy of a map that another node has, as the same incarnation: under its uuid, to be shared by
+    /// [`MapService::share_map`].
+    ///
+    /// # Errors
+    /// As for [`MapService::restore_map`].
+    pub async fn copy_map(
+        &self,
+        name: MapName,
+        map_uuid: Uuid,
+        file: Bytes,
+    ) -> Result<MapVersion, ServiceError> {
+        let reachable = self.allowed_maps.check(&name)?;
+        self.inner.budget.check_to_grow()?;
+        let maps_max = self.limits().maps_max;
+        self.inner.catalog.check_free(&reachable, maps_max, false)?;
+        let inner = Arc::clone(&self.inner);
+        let build = move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
+        let built = self.inner.lanes.map_files.run(&self.asker, build).await??;
+        let built = BuiltMap { uuid: map_uuid, ..built };
+        let (_, map) = self.inner.catalog.restore(reachable, built, maps_max, false, &self.asker).await?;
+        Ok(map.version_now())
+    }
+
     /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it
     /// makes what the log has, and takes changes only where it leads ([`MapService::lead_map`]). To be called before
     /// anybody may change the map. It stays in memory, under its name, until the server ends.
