@@ -23,6 +23,7 @@ mod maps;
 mod observer;
 mod question;
 mod read;
+pub mod replication;
 mod request;
 mod resources;
 mod scan;
