@@ -4,9 +4,19 @@
 //!
 //! 1. `engine`: the connection to NATS, and what is asked over it.
 //! 2. `jetstream_log`: the log of a map, which is a stream.
+//! 3. `bucket`: values by key; `beat`, `beats`: what each node says of itself every two seconds, in one.
+//! 4. `liveness`: who is gone, by the beats of all.
 
+mod beat;
+mod beats;
+mod bucket;
 mod engine;
 mod jetstream_log;
+mod liveness;
 
-pub use engine::{ConnectError, Credentials, Engine, EngineSettings};
-pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News, StreamError};
+pub use beat::{Beat, MapHead};
+pub use beats::{BEAT_EVERY, Beats, NodeBeat};
+pub use bucket::{Bucket, BucketEntry, BucketError};
+pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError};
+pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
+pub use liveness::Liveness;

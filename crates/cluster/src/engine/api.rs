@@ -41,9 +41,14 @@ impl ApiError {
     /// There is no such stream.
     pub(crate) const NO_STREAM: u32 = 10059;
     /// The stream's last sequence, or that of a subject, is not what was expected.
-    pub(crate) const WRONG_LAST_SEQUENCE: u32 = 10071;
+    const WRONG_LAST_SEQUENCE: u32 = 10071;
     /// The same, of a subject with a message on its way.
-    pub(crate) const WRONG_LAST_SEQUENCE_ON_ITS_WAY: u32 = 10164;
+    const WRONG_LAST_SEQUENCE_ON_ITS_WAY: u32 = 10164;
+
+    /// True where the last sequence of a stream or subject is not what was expected.
+    pub(crate) fn is_wrong_last_sequence(&self) -> bool {
+        [Self::WRONG_LAST_SEQUENCE, Self::WRONG_LAST_SEQUENCE_ON_ITS_WAY].contains(&self.err_code)
+    }
 }
 
 impl Engine {

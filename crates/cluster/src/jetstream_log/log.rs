@@ -9,8 +9,8 @@ use super::names::LogNames;
 use super::news::{self, News};
 use super::publish;
 use super::read;
-use super::stream::{self, StreamError};
-use crate::engine::Engine;
+use super::stream::config_of;
+use crate::engine::{Engine, StreamError};
 
 /// The log of a map, in the stream `mrol-UUID`.
 #[derive(Debug)]
@@ -28,7 +28,7 @@ impl JetStreamLog {
     /// Says what NATS said.
     pub fn create(engine: &Engine, map: Uuid) -> Result<Self, StreamError> {
         let names = LogNames::of(map);
-        engine.block_on(stream::create(engine, &names))?;
+        engine.block_on(engine.create_stream(&config_of(&names, engine.replicas())))?;
         Ok(Self::of(engine, names))
     }
 
@@ -38,7 +38,7 @@ impl JetStreamLog {
     /// [`StreamError::Missing`] where there is none, or what NATS said.
     pub fn open(engine: &Engine, map: Uuid) -> Result<Self, StreamError> {
         let names = LogNames::of(map);
-        engine.block_on(stream::find(engine, &names))?;
+        engine.block_on(engine.find_stream(&names.stream))?;
         Ok(Self::of(engine, names))
     }
 
@@ -47,7 +47,7 @@ impl JetStreamLog {
     /// # Errors
     /// Says what NATS said.
     pub fn delete(engine: &Engine, map: Uuid) -> Result<(), StreamError> {
-        engine.block_on(stream::delete(engine, &LogNames::of(map)))
+        engine.block_on(engine.delete_stream(&LogNames::of(map).stream))
     }
 
     /// Deletes what is before a message, which itself stays: nobody may publish behind one that is not there.
@@ -55,7 +55,7 @@ impl JetStreamLog {
     /// # Errors
     /// Says what NATS said.
     pub fn cut_before(&self, sequence: u64) -> Result<(), StreamError> {
-        self.engine.block_on(stream::cut_before(&self.engine, &self.names, sequence))
+        self.engine.block_on(self.engine.cut_stream(&self.names.stream, sequence))
     }
 
     /// The connection.

@@ -21,4 +21,3 @@ mod stream;
 pub use log::JetStreamLog;
 pub use news::News;
 pub use publish::FRAMES_MAX;
-pub use stream::StreamError;

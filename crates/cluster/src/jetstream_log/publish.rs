@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::headers::headers_of;
 use super::leader::{sequence_of, view};
 use super::names::LogNames;
-use crate::engine::{ApiError, CallError, Engine, read_answer};
+use crate::engine::{CallError, Engine, read_answer};
 
 /// Bytes of frames that a message may hold. NATS takes messages of 1 MiB by default, headers included.
 pub const FRAMES_MAX: usize = 768 << 10;
@@ -48,7 +48,9 @@ pub(super) async fn publish(
     let answer = answer.map_err(|error| NotPublished::Unknown(error.to_string()))?;
     match read_answer::<Acknowledgment>(&answer.payload) {
         Ok(acknowledged) => at(acknowledged.seq, names, message, position),
-        Err(CallError::Api(error)) if is_mismatch(&error) => settle(engine, names, message, position).await,
+        Err(CallError::Api(error)) if error.is_wrong_last_sequence() => {
+            settle(engine, names, message, position).await
+        }
         Err(error) => Err(NotPublished::Unknown(error.to_string())),
     }
 }
@@ -60,11 +62,6 @@ fn expect(headers: &mut HeaderMap, names: &LogNames, position: Position) {
         headers.insert(EXPECTED_LAST_OF_SUBJECT, position.sequence.to_string());
         headers.insert(EXPECTED_LAST_SUBJECT, names.subject(id));
     }
-}
-
-fn is_mismatch(error: &ApiError) -> bool {
-    let codes = [ApiError::WRONG_LAST_SEQUENCE, ApiError::WRONG_LAST_SEQUENCE_ON_ITS_WAY];
-    codes.contains(&error.err_code)
 }
 
 /// A message is kept under this number.
