@@ -60,6 +60,7 @@ impl Engine {
         let question = serde_json::to_vec(question).map_err(|error| failed(&error))?;
         let client = self.client();
         let asked = async {
+            self.connected().await;
             let inbox = client.new_inbox();
             let answers = client.subscribe(inbox.clone()).await.map_err(|error| failed(&error))?;
             let subject = format!("$JS.API.DIRECT.GET.{stream}");

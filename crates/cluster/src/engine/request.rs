@@ -8,6 +8,9 @@ use bytes::Bytes;
 
 use super::connection::Engine;
 
+/// How often a lost connection is looked for: the library tells nobody who waits.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
 /// Why a request has no answer. Whether it was received is not known, but for the first.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unanswered {
@@ -32,11 +35,21 @@ impl Engine {
         within: Duration,
     ) -> Result<Message, Unanswered> {
         let request = Request::new().payload(payload).headers(headers).timeout(Some(within));
-        let asked = self.client().send_request(subject.to_owned(), request);
-        // The library's own limit begins once the request is handed over, which a lost connection may delay.
+        let asked = async {
+            self.connected().await;
+            self.client().send_request(subject.to_owned(), request).await
+        };
         match tokio::time::timeout(within, asked).await {
             Ok(answer) => answer.map_err(|error| unanswered(subject, within, &error)),
             Err(_) => Err(Unanswered::TimedOut(within)),
+        }
+    }
+
+    /// Waits for a connection. What is asked without one, the library keeps until there is one: in an outage, each
+    /// repetition of a message would be there once more.
+    pub(super) async fn connected(&self) {
+        while !self.is_connected() {
+            tokio::time::sleep(LOOK_EVERY).await;
         }
     }
 }
