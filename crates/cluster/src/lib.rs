@@ -6,7 +6,9 @@
 //! 2. `jetstream_log`: the log of a map, which is a stream.
 //! 3. `bucket`: values by key; `beat`, `beats`: what each node says of itself every two seconds, in one.
 //! 4. `liveness`: who is gone, by the beats of all.
+//! 5. `bases`: map files that stand for what is cut from the front of a log.
 
+mod bases;
 mod beat;
 mod beats;
 mod bucket;
@@ -14,6 +16,7 @@ mod engine;
 mod jetstream_log;
 mod liveness;
 
+pub use bases::{Base, BaseError, BasePointers, BaseStore};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
