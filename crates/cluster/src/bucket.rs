@@ -65,8 +65,8 @@ impl Bucket {
         Ok(this)
     }
 
-    /// Puts a value, and says its revision. With `expected`, only where the key's revision is this one: 0 where there is
-    /// no such key. Without, in any case.
+    /// Puts a value, and says its revision. With `expected`, only where the key's revision is this one: 0 where there
+    /// is no such key. Without, in any case.
     ///
     /// # Errors
     /// [`BucketError::Changed`], or that nobody answered.

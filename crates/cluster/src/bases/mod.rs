@@ -1,7 +1,7 @@
 //! Bases of maps: map files that stand for what is cut from the front of a log.
 //!
-//! Reading order: `base` is what is known of one; `error` is what may go wrong; `store` holds the files; `pointers` says
-//! which of them is a map's base.
+//! Reading order: `base` is what is known of one; `error` is what may go wrong; `store` holds the files; `pointers`
+//! says which of them is a map's base.
 
 mod base;
 mod error;

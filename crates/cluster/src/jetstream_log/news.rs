@@ -9,8 +9,8 @@ use tokio_stream::StreamExt;
 use super::names::LogNames;
 use crate::engine::Engine;
 
-/// Wakes whoever waits for more of a log, a moment after it was kept by its leader. It is a hint: news may be lost while
-/// NATS is not reached, so whoever waits also looks now and then.
+/// Wakes whoever waits for more of a log, a moment after it was kept by its leader. It is a hint: news may be lost
+/// while NATS is not reached, so whoever waits also looks now and then.
 #[derive(Debug, Clone)]
 pub struct News {
     engine: Engine,

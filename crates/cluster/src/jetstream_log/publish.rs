@@ -15,8 +15,8 @@ use crate::engine::{CallError, Engine, read_answer};
 /// Bytes of frames that a message may hold. NATS takes messages of 1 MiB by default, headers included.
 pub const FRAMES_MAX: usize = 768 << 10;
 
-/// How long an attempt waits. Three servers acknowledged 700 kB after 7 ms as a rule, and of a hundred the slowest after
-/// 115; a leader that does not answer for so long is as good as gone.
+/// How long an attempt waits. Three servers acknowledged 700 kB after 7 ms as a rule, and of a hundred the slowest
+/// after 115; a leader that does not answer for so long is as good as gone.
 const ATTEMPT_MAX: Duration = Duration::from_millis(500);
 
 /// The stream's last sequence, as the writer knows it.
