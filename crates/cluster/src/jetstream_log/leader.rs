@@ -3,12 +3,15 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
+use async_nats::HeaderMap;
+use bytes::Bytes;
 use mrol_service::replication::Position;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::names::LogNames;
-use crate::engine::{ApiError, CallError, Engine};
+use crate::engine::{ApiError, CallError, Engine, read_answer};
 
 /// How long the leader may take.
 const WITHIN: Duration = Duration::from_millis(400);
@@ -17,16 +20,21 @@ const WITHIN: Duration = Duration::from_millis(400);
 /// elect another after four seconds of silence at the earliest.
 const HEARD_WITHIN: Duration = Duration::from_secs(3);
 
+/// A last sequence that no stream has: one of a thousand messages a second reaches it in thirty thousand years.
+const NO_LAST_SEQUENCE: &str = "1000000000000000";
+
 /// What the leader of a stream knows of a position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct LeaderView {
     /// Number of the last message.
     pub(super) last_sequence: u64,
     /// True where the message at the position is there, and for the position before all.
     pub(super) holds: bool,
+    /// Who leads; nobody where there is one server.
+    leader: Option<String>,
     /// True where most of the replicas follow this leader. One that is cut off from them may not know of messages, and
     /// is asked all the same where nobody else can be reached.
-    pub(super) is_certain: bool,
+    is_followed: bool,
 }
 
 #[derive(Deserialize)]
@@ -44,6 +52,7 @@ struct State {
 
 #[derive(Deserialize)]
 struct Cluster {
+    leader: Option<String>,
     #[serde(default)]
     replicas: Vec<Replica>,
 }
@@ -67,7 +76,8 @@ impl Cluster {
     }
 }
 
-/// Asks the leader of a stream for a position.
+/// Asks the leader of a stream for a position. What it says it has, is there. What it says it has not, may be there:
+/// right after an election it does not know yet of all that was acknowledged.
 pub(super) async fn view(
     engine: &Engine,
     names: &LogNames,
@@ -84,19 +94,44 @@ pub(super) async fn view(
     Ok(LeaderView {
         last_sequence: info.state.last_seq,
         holds: subject.is_none_or(|subject| info.state.subjects.contains_key(&subject)),
-        is_certain: info.cluster.is_none_or(|cluster| cluster.is_followed_by_most()),
+        is_followed: info.cluster.as_ref().is_none_or(Cluster::is_followed_by_most),
+        leader: info.cluster.and_then(|cluster| cluster.leader),
     })
 }
 
-/// Asks the leader of a stream for the number of a message, if it is there.
-pub(super) async fn sequence_of(
+/// The same, of a leader that knows of all that was acknowledged; `None` where none is known to.
+///
+/// A leader takes messages only once it knows of all before. So one is published that cannot be taken: the same leader
+/// refuses it, and is asked then.
+pub(super) async fn certain_view(
     engine: &Engine,
     names: &LogNames,
-    id: Uuid,
-) -> Result<Option<u64>, CallError> {
+    position: Position,
+) -> Result<Option<LeaderView>, CallError> {
+    let before = view(engine, names, position).await?;
+    let mut headers = HeaderMap::new();
+    headers.insert("Nats-Expected-Last-Sequence", NO_LAST_SEQUENCE);
+    headers.insert("Nats-Expected-Last-Subject-Sequence", NO_LAST_SEQUENCE);
+    let answer = engine.request(&names.nothing(), headers, Bytes::new(), WITHIN).await?;
+    match read_answer::<IgnoredAny>(&answer.payload) {
+        Err(CallError::Api(error)) if error.is_wrong_last_sequence() => {}
+        Err(error) => return Err(error),
+        Ok(_) => return Ok(None),
+    }
+    let after = view(engine, names, position).await?;
+    Ok((after.is_followed && after.leader == before.leader).then_some(after))
+}
+
+/// Asks the leader of a stream for the id of the message with this number, if it is there. `Some(None)` is one that is
+/// none of the log.
+pub(super) async fn id_at(
+    engine: &Engine,
+    names: &LogNames,
+    sequence: u64,
+) -> Result<Option<Option<Uuid>>, CallError> {
     #[derive(Serialize)]
     struct Question {
-        last_by_subj: String,
+        seq: u64,
         no_hdr: bool,
     }
     #[derive(Deserialize)]
@@ -105,12 +140,11 @@ pub(super) async fn sequence_of(
     }
     #[derive(Deserialize)]
     struct Found {
-        seq: u64,
+        subject: String,
     }
     let endpoint = format!("STREAM.MSG.GET.{}", names.stream);
-    let question = Question { last_by_subj: names.subject(id), no_hdr: true };
-    match engine.call::<Answer>(&endpoint, &question, WITHIN).await {
-        Ok(answer) => Ok(Some(answer.message.seq)),
+    match engine.call::<Answer>(&endpoint, &Question { seq: sequence, no_hdr: true }, WITHIN).await {
+        Ok(answer) => Ok(Some(names.id_of(&answer.message.subject))),
         Err(CallError::Api(ApiError { err_code: ApiError::NO_MESSAGE, .. })) => Ok(None),
         Err(error) => Err(error),
     }
@@ -124,7 +158,7 @@ mod tests {
         let replicas = active
             .iter()
             .map(|&(offline, seconds)| Replica { offline, active: Duration::from_secs(seconds).as_nanos() });
-        Cluster { replicas: replicas.collect() }.is_followed_by_most()
+        Cluster { leader: None, replicas: replicas.collect() }.is_followed_by_most()
     }
 
     #[test]

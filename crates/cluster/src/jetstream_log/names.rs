@@ -28,6 +28,16 @@ impl LogNames {
         format!("{}.{id}", self.prefix)
     }
 
+    /// The id of the message with this subject.
+    pub(super) fn id_of(&self, subject: &str) -> Option<Uuid> {
+        subject.strip_prefix(&self.prefix)?.strip_prefix('.')?.parse().ok()
+    }
+
+    /// A subject of no message, to which the stream listens all the same.
+    pub(super) fn nothing(&self) -> String {
+        format!("{}.nothing", self.prefix)
+    }
+
     /// The subjects of all messages.
     pub(super) fn subjects(&self) -> String {
         format!("{}.*", self.prefix)

@@ -8,7 +8,7 @@ use mrol_service::replication::{Body, Message, NotPublished, Position};
 use serde::Deserialize;
 
 use super::headers::headers_of;
-use super::leader::{sequence_of, view};
+use super::leader::{certain_view, id_at};
 use super::names::LogNames;
 use crate::engine::{CallError, Engine, read_answer};
 
@@ -75,7 +75,7 @@ fn at(sequence: u64, names: &LogNames, message: &Message, position: Position) ->
 }
 
 /// Says what it means that the stream did not end at the position: that this message is there from an attempt before,
-/// that another is, or that one is on its way.
+/// that another is, that one is on its way, or that the position is lost.
 async fn settle(
     engine: &Engine,
     names: &LogNames,
@@ -83,27 +83,28 @@ async fn settle(
     position: Position,
 ) -> Result<(), NotPublished> {
     let unknown = |error: CallError| NotPublished::Unknown(error.to_string());
-    // The end first: what is there now is found by the second question too.
-    let leader = view(engine, names, position).await.map_err(unknown)?;
-    if let Some(sequence) = sequence_of(engine, names, message.id).await.map_err(unknown)? {
-        return at(sequence, names, message, position);
+    match id_at(engine, names, position.sequence + 1).await.map_err(unknown)? {
+        Some(id) if id == Some(message.id) => return Ok(()),
+        Some(_) => return Err(NotPublished::Refused),
+        None => {}
     }
-    if !leader.is_certain {
-        let text = "the leader of the stream is cut off from most of its replicas";
-        return Err(NotPublished::Unknown(text.to_owned()));
-    }
-    let is_last = leader.holds && leader.last_sequence == position.sequence;
-    if is_last && is_there(engine, names, position).await.map_err(unknown)? {
-        let text = "another message is on its way to the same place of the log";
-        return Err(NotPublished::Unknown(text.to_owned()));
-    }
-    Err(NotPublished::Refused)
+    let text = match certain_view(engine, names, position).await.map_err(unknown)? {
+        None => "the stream has no leader that knows of all messages",
+        Some(leader) if leader.last_sequence > position.sequence => {
+            "another message came to the same place of the log, or that was cut"
+        }
+        Some(leader) if leader.holds && is_there(engine, names, position).await.map_err(unknown)? => {
+            "another message is on its way to the same place of the log"
+        }
+        Some(_) => return Err(NotPublished::Refused),
+    };
+    Err(NotPublished::Unknown(text.to_owned()))
 }
 
 /// True where the message at the position has this number too, and for the position before all.
 async fn is_there(engine: &Engine, names: &LogNames, position: Position) -> Result<bool, CallError> {
     match position.id {
         None => Ok(position.sequence == 0),
-        Some(id) => Ok(sequence_of(engine, names, id).await? == Some(position.sequence)),
+        id => Ok(id_at(engine, names, position.sequence).await? == Some(id)),
     }
 }

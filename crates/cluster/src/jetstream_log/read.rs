@@ -6,9 +6,9 @@ use mrol_service::replication::{Entry, LogError, Position};
 use serde::Serialize;
 
 use super::headers::entry_of;
-use super::leader::view;
+use super::leader::{certain_view, view};
 use super::names::LogNames;
-use crate::engine::{BatchMessage, Engine};
+use crate::engine::{BatchMessage, CallError, Engine};
 
 /// Messages that are read at once: of the smallest, half a megabyte.
 const MESSAGES_MAX: u32 = 1_000;
@@ -79,13 +79,15 @@ fn chain(entries: Vec<Entry>, names: &LogNames) -> Result<Vec<Entry>, LogError> 
 
 /// Makes sure that the stream has a position, of which the replica that was read knows nothing, or something else.
 async fn confirm(engine: &Engine, names: &LogNames, position: Position) -> Result<(), LogError> {
-    let leader = view(engine, names, position).await;
-    let leader = leader.map_err(|error| LogError::Unavailable(error.to_string()))?;
-    match leader.holds {
-        true => Ok(()),
-        false if leader.is_certain => Err(LogError::NoSuchPosition),
-        false => {
-            let text = "the leader of the stream is cut off from most of its replicas";
+    let unavailable = |error: CallError| LogError::Unavailable(error.to_string());
+    if view(engine, names, position).await.map_err(unavailable)?.holds {
+        return Ok(());
+    }
+    match certain_view(engine, names, position).await.map_err(unavailable)? {
+        Some(leader) if leader.holds => Ok(()),
+        Some(_) => Err(LogError::NoSuchPosition),
+        None => {
+            let text = "the stream has no leader that knows of all messages";
             Err(LogError::Unavailable(text.to_owned()))
         }
     }
