@@ -31,7 +31,8 @@ struct Acknowledgment {
     seq: u64,
 }
 
-/// Publishes a message directly behind a position.
+/// Publishes a message directly behind a position. Takes an attempt, and as long again where it is to be found out what
+/// came of one before.
 pub(super) async fn publish(
     engine: &Engine,
     names: &LogNames,
@@ -49,7 +50,9 @@ pub(super) async fn publish(
     match read_answer::<Acknowledgment>(&answer.payload) {
         Ok(acknowledged) => at(acknowledged.seq, names, message, position),
         Err(CallError::Api(error)) if error.is_wrong_last_sequence() => {
-            settle(engine, names, message, position).await
+            let settled = settle(engine, names, message, position);
+            let late = |_| Err(NotPublished::Unknown(format!("{error}; and what is there was not answered")));
+            tokio::time::timeout(ATTEMPT_MAX, settled).await.unwrap_or_else(late)
         }
         Err(error) => Err(NotPublished::Unknown(error.to_string())),
     }

@@ -40,7 +40,7 @@ pub(super) async fn read_behind(
         Some(_) => {
             confirm(engine, names, position).await?;
             let stream = &names.stream;
-            Err(LogError::Unavailable(format!("a replica of stream {stream} differs from its leader's")))
+            Err(LogError::Unavailable(format!("stream {stream}: a replica differs from its leader's")))
         }
     }
 }
@@ -79,16 +79,18 @@ fn chain(entries: Vec<Entry>, names: &LogNames) -> Result<Vec<Entry>, LogError> 
 
 /// Makes sure that the stream has a position, of which the replica that was read knows nothing, or something else.
 async fn confirm(engine: &Engine, names: &LogNames, position: Position) -> Result<(), LogError> {
-    let unavailable = |error: CallError| LogError::Unavailable(error.to_string());
-    if view(engine, names, position).await.map_err(unavailable)?.holds {
-        return Ok(());
-    }
-    match certain_view(engine, names, position).await.map_err(unavailable)? {
-        Some(leader) if leader.holds => Ok(()),
-        Some(_) => Err(LogError::NoSuchPosition),
-        None => {
-            let text = "the stream has no leader that knows of all messages";
-            Err(LogError::Unavailable(text.to_owned()))
+    let asked = async {
+        match view(engine, names, position).await? {
+            leader if leader.holds => Ok(Some(leader)),
+            _ => certain_view(engine, names, position).await,
         }
+    };
+    let unavailable = |text: &str| Err(LogError::Unavailable(format!("stream {}: {text}", names.stream)));
+    match tokio::time::timeout(WITHIN, asked).await {
+        Ok(Ok(Some(leader))) if leader.holds => Ok(()),
+        Ok(Ok(Some(_))) => Err(LogError::NoSuchPosition),
+        Ok(Ok(None)) => unavailable("no leader knows of all messages"),
+        Ok(Err(error)) => unavailable(&CallError::to_string(&error)),
+        Err(_) => unavailable("its leader does not answer"),
     }
 }

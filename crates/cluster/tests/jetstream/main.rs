@@ -7,5 +7,6 @@ mod connecting;
 mod lost_servers;
 mod older_copies;
 mod publishing;
+mod random_kills;
 mod reading;
 mod support;
