@@ -44,6 +44,13 @@ impl ApiError {
     const WRONG_LAST_SEQUENCE: u32 = 10071;
     /// The same, of a subject with a message on its way.
     const WRONG_LAST_SEQUENCE_ON_ITS_WAY: u32 = 10164;
+    /// A message of this id is on its way, or was lost or refused moments ago.
+    const ID_IN_PROCESS: u32 = 10158;
+
+    /// True where the id of a message is known, and what became of it is not.
+    pub(crate) fn is_id_in_process(&self) -> bool {
+        self.err_code == Self::ID_IN_PROCESS
+    }
 
     /// True where the last sequence of a stream or subject is not what was expected.
     pub(crate) fn is_wrong_last_sequence(&self) -> bool {

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::headers::headers_of;
 use super::leader::{certain_view, id_at};
 use super::names::LogNames;
-use crate::engine::{CallError, Engine, read_answer};
+use crate::engine::{ApiError, CallError, Engine, read_answer};
 
 /// Bytes of frames that a message may hold. NATS takes messages of 1 MiB by default, headers included.
 pub const FRAMES_MAX: usize = 768 << 10;
@@ -49,8 +49,8 @@ pub(super) async fn publish(
     let answer = answer.map_err(|error| NotPublished::Unknown(error.to_string()))?;
     match read_answer::<Acknowledgment>(&answer.payload) {
         Ok(acknowledged) => at(acknowledged.seq, names, message, position),
-        Err(CallError::Api(error)) if error.is_wrong_last_sequence() => {
-            let settled = settle(engine, names, message, position);
+        Err(CallError::Api(error)) if error.is_wrong_last_sequence() || error.is_id_in_process() => {
+            let settled = settle(engine, names, message, position, &error);
             let late = |_| Err(NotPublished::Unknown(format!("{error}; and what is there was not answered")));
             tokio::time::timeout(ATTEMPT_MAX, settled).await.unwrap_or_else(late)
         }
@@ -84,11 +84,14 @@ async fn settle(
     names: &LogNames,
     message: &Message,
     position: Position,
+    said: &ApiError,
 ) -> Result<(), NotPublished> {
     let unknown = |error: CallError| NotPublished::Unknown(error.to_string());
     match id_at(engine, names, position.sequence + 1).await.map_err(unknown)? {
         Some(id) if id == Some(message.id) => return Ok(()),
         Some(_) => return Err(NotPublished::Refused),
+        // "In process" is no refusal.
+        None if said.is_id_in_process() => return Err(NotPublished::Unknown(said.to_string())),
         None => {}
     }
     let text = match certain_view(engine, names, position).await.map_err(unknown)? {
