@@ -90,6 +90,8 @@ async fn greeted(settings: &EngineSettings) -> Result<Client, ConnectError> {
                 ConnectError::Unauthorized { servers, cause }
             }
             ConnectErrorKind::Tls => ConnectError::Tls { servers, cause },
+            // The library has no kind for a certificate that is not trusted: "invalid peer certificate".
+            ConnectErrorKind::Io if cause.contains("certificate") => ConnectError::Tls { servers, cause },
             _ => ConnectError::NoServer { servers, cause },
         }
     })

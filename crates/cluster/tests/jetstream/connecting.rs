@@ -20,7 +20,7 @@ fn where_no_server_is_the_error_names_the_addresses() {
 #[test]
 fn a_password_in_the_address_is_given_and_never_shown() {
     let more = "authorization { users: [{ user: mrol, password: right }] }";
-    let Some(servers) = NatsServers::start_with(1, more) else { return };
+    let Some(servers) = NatsServers::start_with(1, more, "") else { return };
     let mut settings = servers.settings();
     let with = |password: &str| settings.urls[0].replace("nats://", &format!("nats://mrol:{password}@"));
     let (right, wrong) = (with("right"), with("wrong"));
@@ -40,7 +40,7 @@ fn an_nkey_is_a_credential() {
     let seed = "SUANQDPB2RUOE4ETUA26CNX7FUKE5ZZKFCQIIW63OX225F2CO7UEXTM7ZY";
     let public = "UAMMBNV2EYR65NYZZ7IAK5SIR5ODNTTERJOBOF4KJLMWI45YOXOSWULM";
     let more = format!("authorization {{ users: [{{ nkey: {public} }}] }}");
-    let Some(servers) = NatsServers::start_with(1, &more) else { return };
+    let Some(servers) = NatsServers::start_with(1, &more, "") else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("seed");
     std::fs::write(&path, format!("{seed}\n")).unwrap();

@@ -63,6 +63,27 @@ fn without_a_quorum_it_is_unknown_within_a_second_and_known_again_later() {
 }
 
 #[test]
+fn where_a_store_is_full_it_is_unknown_and_goes_on_once_there_is_space() {
+    let Some(servers) = NatsServers::start_with(1, "", "max_file_store: 5000000") else { return };
+    let engine = servers.engine();
+    let log = JetStreamLog::create(&engine, Uuid::new_v4()).unwrap();
+    let mut writer = Writer::new(&log);
+    let outcome = loop {
+        let message = changes(writer.position, 700_000);
+        if let Err(error) = writer.publish(&message) {
+            break error;
+        }
+    };
+    let NotPublished::Unknown(text) = outcome else { panic!("refused") };
+    assert!(text.contains("resource"), "{text}");
+    assert!((5..=9).contains(&writer.written.len()), "{}", writer.written.len());
+    log.cut_before(writer.position.sequence).unwrap();
+    let message = changes(writer.position, 700_000);
+    writer.publish_at_last(&message);
+    assert_eq!(read_all(&log).0, writer.written[writer.written.len() - 2..]);
+}
+
+#[test]
 fn a_log_that_was_killed_with_all_its_servers_is_there_again() {
     let Some(mut servers) = NatsServers::start(3) else { return };
     let engine = servers.engine();

@@ -34,11 +34,11 @@ struct Server {
 impl NatsServers {
     /// So many servers, or `None` where there is no program: the test is skipped.
     pub(crate) fn start(count: usize) -> Option<Self> {
-        Self::start_with(count, "")
+        Self::start_with(count, "", "")
     }
 
-    /// So many servers, with more of a configuration.
-    pub(crate) fn start_with(count: usize, more: &str) -> Option<Self> {
+    /// So many servers, with more of a configuration, and of that of their stores.
+    pub(crate) fn start_with(count: usize, more: &str, of_stores: &str) -> Option<Self> {
         let Some(program) = std::env::var_os(PROGRAM) else {
             skipped(&format!("no nats-server (set {PROGRAM} to what .ci/nats-server prints)"));
             return None;
@@ -53,7 +53,7 @@ impl NatsServers {
             let monitor = monitors[index];
             let mut config = format!(
                 "server_name: n{index}\nlisten: \"127.0.0.1:{port}\"\nhttp: \"127.0.0.1:{monitor}\"\n{more}\n\
-                 jetstream {{ store_dir: {store:?}, sync_interval: always }}\n"
+                 jetstream {{ store_dir: {store:?}, sync_interval: always, {of_stores} }}\n"
             );
             if count > 1 {
                 let routes = routes_text.join(", ");
