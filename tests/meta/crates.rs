@@ -49,6 +49,12 @@ fn planners_compile_no_server() {
 }
 
 #[test]
+fn what_nodes_share_is_kept_without_a_server() {
+    let server = ["mrol", "mrol-client", "axum", "clap", "tonic", "utoipa", "figment", "metrics"];
+    check_without("mrol-cluster", &server);
+}
+
+#[test]
 fn the_server_compiles_no_lab() {
     check_without("mrol", &["mrol-lab", "plotters", "hdrhistogram", "criterion"]);
 }

@@ -32,7 +32,12 @@ impl Worker {
                 self.member = Some(Member::join(log, node, map));
                 self.catch_up()?;
             }
-            SharedAct::Follow => self.catch_up()?,
+            SharedAct::Follow { newest } => {
+                let read = self.member.as_ref().map_or(0, |member| member.position().sequence);
+                if newest != Some(read) {
+                    self.catch_up()?;
+                }
+            }
             SharedAct::Lead(live) => self.lead(&live)?,
             SharedAct::HandOver(node) => self.hand_over(node)?,
             SharedAct::Base(told) => {

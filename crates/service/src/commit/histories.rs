@@ -221,7 +221,7 @@ impl History {
         let node = self.rng.random_range(0..NODES);
         match self.rng.random_range(0..100) {
             0..40 => self.change(node)?,
-            40..60 => self.act(node, SharedAct::Follow)?,
+            40..60 => self.act(node, SharedAct::Follow { newest: None })?,
             60..72 => self.lead(node)?,
             72..75 => {
                 let to = self.nodes[self.rng.random_range(0..NODES)].name.clone();
@@ -409,13 +409,13 @@ impl History {
         (0..NODES).try_for_each(|node| self.start(node))?;
         for _ in 0..2 {
             for node in 0..NODES {
-                self.act(node, SharedAct::Follow)?;
+                self.act(node, SharedAct::Follow { newest: None })?;
                 self.start(node)?;
             }
         }
         let revision = |node: &Node| node.process.as_ref().map_or(0, |process| process.map.revision());
         (0..NODES).try_for_each(|node| self.lead(node))?;
-        (0..NODES).try_for_each(|node| self.act(node, SharedAct::Follow))?;
+        (0..NODES).try_for_each(|node| self.act(node, SharedAct::Follow { newest: None }))?;
         self.compare()?;
         let last = self.nodes.iter().map(revision).max().unwrap_or_default();
         for node in &self.nodes {

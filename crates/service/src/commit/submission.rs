@@ -47,8 +47,8 @@ pub(crate) enum Submission {
 pub(crate) enum SharedAct {
     /// Begins to share the map `map`, as `node`.
     Join { log: Arc<dyn ReplicatedLog>, node: NodeName, map: Uuid },
-    /// Makes what the log has.
-    Follow,
+    /// Makes what the log has, unless the message of this number was read already.
+    Follow { newest: Option<u64> },
     /// Takes over, where no live node is ahead of this one: those nodes, with the revisions that they are at.
     Lead(Vec<(NodeName, u64)>),
     /// Gives the lead to another node.

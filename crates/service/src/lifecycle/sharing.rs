@@ -62,12 +62,13 @@ impl MapService {
         self.act_on(name, SharedAct::Join { log, node, map: map.uuid }).await
     }
 
-    /// Makes what the log of a shared map has; to be called whenever it may have more.
+    /// Makes what the log of a shared map has; to be called whenever it may have more. Nothing is asked of the log where
+    /// the message of the number `newest` is the last that this node read.
     ///
     /// # Errors
     /// As for [`MapService::share_map`].
-    pub async fn follow_map(&self, name: &MapName) -> Result<MapVersion, ServiceError> {
-        self.act_on(name, SharedAct::Follow).await
+    pub async fn follow_map(&self, name: &MapName, newest: Option<u64>) -> Result<MapVersion, ServiceError> {
+        self.act_on(name, SharedAct::Follow { newest }).await
     }
 
     /// Takes the lead of a shared map over, and gives its log what only this node has. `live` are the other nodes that

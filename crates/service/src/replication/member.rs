@@ -82,7 +82,6 @@ impl Member {
     }
 
     /// Up to where the log was read.
-    #[cfg(test)]
     pub(crate) fn position(&self) -> Position {
         self.reading.position
     }

@@ -1,0 +1,55 @@
+//! What a node says of itself every two seconds.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+/// What a node says of itself every two seconds. What a later version adds, this one leaves out.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Beat {
+    /// Address of its HTTP listener, as others reach it: `http://HOST:PORT`.
+    pub http: String,
+    /// Address of its gRPC listener, likewise.
+    pub grpc: String,
+    /// Its version, such as `0.2.0`.
+    pub version: String,
+    /// Version of the records that it reads: a map is led only by who writes what all others read.
+    pub record_version: u32,
+    /// The maps that it holds, by uuid.
+    #[serde(default)]
+    pub maps: BTreeMap<Uuid, MapHead>,
+    /// Bytes that its disk has left.
+    pub free_bytes: u64,
+}
+
+/// How far a node's copy of a map is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MapHead {
+    /// Revision of its last change.
+    pub revision: u64,
+    /// Epoch in which that was made.
+    pub epoch: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_beat_is_read_as_it_was_written_and_by_versions_that_know_less() {
+        let maps = BTreeMap::from([(Uuid::from_u128(7), MapHead { revision: 12, epoch: 3 })]);
+        let beat = Beat {
+            http: "http://a:7333".to_owned(),
+            grpc: "http://a:7334".to_owned(),
+            version: "0.2.0".to_owned(),
+            record_version: 5,
+            maps,
+            free_bytes: 1 << 40,
+        };
+        let text = serde_json::to_string(&beat).unwrap();
+        assert_eq!(serde_json::from_str::<Beat>(&text).unwrap(), beat);
+        let later = text.replacen('{', "{\"mood\":\"good\",", 1);
+        assert_eq!(serde_json::from_str::<Beat>(&later).unwrap(), beat);
+    }
+}

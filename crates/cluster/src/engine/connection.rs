@@ -1,0 +1,81 @@
+//! The connection to NATS.
+
+use std::fmt;
+use std::future::Future;
+use std::sync::Arc;
+
+use async_nats::Client;
+use async_nats::connection::State;
+use tokio::runtime::{Handle, Runtime};
+use tokio::task::JoinHandle;
+
+use super::settings::EngineSettings;
+
+/// The connection of a node to NATS, with a thread of its own: a busy server does not delay its pings. Clones share
+/// it; it ends with the last.
+///
+/// It is made again by itself, for as long as it takes. What is asked meanwhile ends with its deadline.
+#[derive(Clone)]
+pub struct Engine(Arc<Connection>);
+
+struct Connection {
+    client: Client,
+    replicas: usize,
+    servers: String,
+    handle: Handle,
+    /// Taken at the end, which does not wait for what still runs.
+    runtime: Option<Runtime>,
+}
+
+impl Engine {
+    /// Of a runtime that has a connection.
+    pub(super) fn of(client: Client, settings: &EngineSettings, runtime: Runtime) -> Self {
+        let (replicas, servers) = (settings.replicas, settings.servers());
+        let handle = runtime.handle().clone();
+        Self(Arc::new(Connection { client, replicas, servers, handle, runtime: Some(runtime) }))
+    }
+
+    /// True while a server is connected.
+    pub fn is_connected(&self) -> bool {
+        self.0.client.connection_state() == State::Connected
+    }
+
+    /// The addresses that were given, without passwords.
+    pub fn servers(&self) -> &str {
+        &self.0.servers
+    }
+
+    /// Waits for what needs the connection. Not for an async thread, on which it panics.
+    pub(crate) fn block_on<F: Future>(&self, future: F) -> F::Output {
+        self.0.handle.block_on(future)
+    }
+
+    /// Begins what runs beside.
+    pub(crate) fn spawn(&self, future: impl Future<Output = ()> + Send + 'static) -> JoinHandle<()> {
+        self.0.handle.spawn(future)
+    }
+
+    /// The connection as its library has it.
+    pub(crate) fn client(&self) -> &Client {
+        &self.0.client
+    }
+
+    /// On how many servers each stream is kept.
+    pub(crate) fn replicas(&self) -> usize {
+        self.0.replicas
+    }
+}
+
+impl fmt::Debug for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Engine").field(&self.0.servers).finish()
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Streams: made, found, cut and deleted.
+
+use std::time::Duration;
+
+use async_nats::jetstream::stream::Config;
+use serde::Serialize;
+use serde::de::IgnoredAny;
+
+use super::api::{ApiError, CallError};
+use super::connection::Engine;
+
+/// How long JetStream may take for a stream. To make one, its servers elect a leader; seen: 0.1 to 1.5 s.
+const WITHIN: Duration = Duration::from_secs(5);
+
+/// Why a stream could not be made, found, cut or deleted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StreamError {
+    /// There is none.
+    #[error("NATS has no stream {0}")]
+    Missing(String),
+    /// NATS refused, or did not answer.
+    #[error("stream {stream}: {cause}")]
+    Failed {
+        /// Its name.
+        stream: String,
+        /// What NATS said, or that it did not.
+        cause: String,
+    },
+}
+
+impl Engine {
+    /// Makes a stream where there is none. One that is there stays as it is.
+    pub(crate) async fn create_stream(&self, config: &Config) -> Result<(), StreamError> {
+        match self.find_stream(&config.name).await {
+            Err(StreamError::Missing(_)) => self.ask_of_stream("CREATE", &config.name, config).await,
+            found => found,
+        }
+    }
+
+    /// Makes sure that there is a stream.
+    pub(crate) async fn find_stream(&self, stream: &str) -> Result<(), StreamError> {
+        self.ask_of_stream("INFO", stream, &()).await
+    }
+
+    /// Deletes the messages of a stream before this one, which stays.
+    pub(crate) async fn cut_stream(&self, stream: &str, before: u64) -> Result<(), StreamError> {
+        #[derive(Serialize)]
+        struct Purge {
+            seq: u64,
+        }
+        self.ask_of_stream("PURGE", stream, &Purge { seq: before }).await
+    }
+
+    /// Deletes a stream, where there is one.
+    pub(crate) async fn delete_stream(&self, stream: &str) -> Result<(), StreamError> {
+        match self.ask_of_stream("DELETE", stream, &()).await {
+            Err(StreamError::Missing(_)) => Ok(()),
+            done => done,
+        }
+    }
+
+    async fn ask_of_stream(
+        &self,
+        what: &str,
+        stream: &str,
+        question: &impl Serialize,
+    ) -> Result<(), StreamError> {
+        let endpoint = format!("STREAM.{what}.{stream}");
+        match self.call::<IgnoredAny>(&endpoint, question, WITHIN).await {
+            Ok(_) => Ok(()),
+            Err(CallError::Api(ApiError { err_code: ApiError::NO_STREAM, .. })) => {
+                Err(StreamError::Missing(stream.to_owned()))
+            }
+            Err(error) => Err(StreamError::Failed { stream: stream.to_owned(), cause: error.to_string() }),
+        }
+    }
+}

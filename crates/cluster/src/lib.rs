@@ -1,0 +1,28 @@
+//! What nodes that serve the same maps share, kept by NATS JetStream.
+//!
+//! Reading order of the rooms; none names a room of a later line:
+//!
+//! 1. `engine`: the connection to NATS, and what is asked over it.
+//! 2. `bucket`: values by key; `beat`, `beats`: what each node says of itself every two seconds, in one.
+//! 3. `liveness`: who is gone, by the beats of all.
+//! 4. `bases`: map files that stand for what is cut from the front of a log.
+//! 5. `jetstream_log`: the log of a map, which is a stream.
+//! 6. `following`: what makes a node's copy of a map follow its log.
+
+mod bases;
+mod beat;
+mod beats;
+mod bucket;
+mod engine;
+mod following;
+mod jetstream_log;
+mod liveness;
+
+pub use bases::{BaseError, BasePointers, BaseStore};
+pub use beat::{Beat, MapHead};
+pub use beats::{BEAT_EVERY, Beats, NodeBeat};
+pub use bucket::{Bucket, BucketEntry, BucketError};
+pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError};
+pub use following::Following;
+pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
+pub use liveness::Liveness;

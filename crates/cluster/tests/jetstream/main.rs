@@ -1,0 +1,13 @@
+//! The log of a map in streams of real NATS servers, which are killed, halted and put back.
+#![expect(clippy::unwrap_used, reason = "tests fail where their servers do")]
+
+mod bases;
+mod beats;
+mod connecting;
+mod lost_servers;
+mod older_copies;
+mod publishing;
+mod random_kills;
+mod reading;
+mod shared_maps;
+mod support;
