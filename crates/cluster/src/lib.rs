@@ -16,7 +16,7 @@ mod engine;
 mod jetstream_log;
 mod liveness;
 
-pub use bases::{Base, BaseError, BasePointers, BaseStore};
+pub use bases::{Base, BaseError, BasePointers, BaseStore, Orphans};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
