@@ -18,7 +18,7 @@ mod following;
 mod jetstream_log;
 mod liveness;
 
-pub use bases::{BaseError, BasePointers, BaseStore};
+pub use bases::{BaseError, BasePointers, BaseStore, Orphans};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};

@@ -18,7 +18,7 @@ use crate::engine::{Engine, StreamError};
 use mrol_service::replication::Base;
 
 /// Name of the object store.
-const NAME: &str = "mrol-bases";
+pub(super) const NAME: &str = "mrol-bases";
 
 /// Bytes of a piece. Each is acknowledged before the next, so that larger ones are faster: three servers on one machine
 /// took 20 MB in 0.5 s, and gave them in 0.1 s. NATS takes messages of 1 MiB.
@@ -30,7 +30,7 @@ const NEXT_WITHIN: Duration = Duration::from_secs(10);
 /// The files of bases, in the object store `mrol-bases`. A file is there as a whole or not at all.
 #[derive(Debug, Clone)]
 pub struct BaseStore {
-    engine: Engine,
+    pub(super) engine: Engine,
 }
 
 impl BaseStore {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use mrol_cluster::{BaseError, BasePointers, BaseStore, JetStreamLog};
+use mrol_cluster::{BaseError, BasePointers, BaseStore, JetStreamLog, Orphans};
 use mrol_map::map::StateHash;
 use mrol_service::replication::{Base, LogError, Position, ReplicatedLog};
 use uuid::Uuid;
@@ -88,9 +88,13 @@ fn a_file_whose_upload_was_cut_short_is_not_there_and_is_put_again() {
     assert!(matches!(cut, Err(BaseError::Unavailable(_))), "{cut:?}");
     servers.start_all();
     assert!(!eventually(|| store.has(map, &base)));
+    let orphans = store.sweep(&Orphans::default()).unwrap();
+    assert!(orphans.pieces() > 0, "nothing was put before the servers were killed");
     let fetched = folder.path().join("fetched");
     assert!(matches!(store.fetch(map, &base, &fetched), Err(BaseError::Unavailable(_))));
     eventually(|| store.put(map, &base, &file));
+    assert_eq!(store.sweep(&Orphans::default()).unwrap(), orphans, "what was put is no orphan");
+    assert_eq!(store.sweep(&orphans).unwrap(), Orphans::default());
     store.fetch(map, &base, &fetched).unwrap();
     assert!(fs::read(&fetched).unwrap() == bytes, "another file");
 }

@@ -25,7 +25,6 @@ const EQUAL_WITHIN: Duration = Duration::from_secs(40);
 struct Node {
     name: NodeName,
     service: MapService,
-    log: Arc<JetStreamLog>,
     _following: Following,
 }
 
@@ -50,7 +49,7 @@ impl Node {
         // Where the log does not answer yet, the node follows it once it does.
         drop(runtime.block_on(service.share_map(&map(), log.clone(), node.clone())));
         let following = Following::begin(service.clone(), map(), &log);
-        Self { name: node, service, log, _following: following }
+        Self { name: node, service, _following: following }
     }
 
     fn version(&self, runtime: &Runtime) -> (u64, Option<ContentHash>) {

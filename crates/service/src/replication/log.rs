@@ -35,7 +35,7 @@ pub enum LogError {
 /// newest all the same, when a fault of its engine or an older copy put back takes them away: whoever shares it
 /// compares positions by id.
 ///
-/// All calls may wait, for half a second or so, and are not for an async thread.
+/// All calls may wait, for a second at most, and are not for an async thread.
 pub trait ReplicatedLog: Debug + Send + Sync {
     /// Publishes a message directly behind `position`, or not at all: by compare-and-set on the number *and* the id of
     /// the log's last message. Returns once it is acknowledged. A call that fails may be made again with the same
@@ -53,6 +53,8 @@ pub trait ReplicatedLog: Debug + Send + Sync {
 
     /// Reads the messages directly behind `position`, in order: at least one where there are any that this node's part
     /// of the log knows of, and some megabytes at most.
+    ///
+    /// A position that was just cut off is still one, where the first message that was kept names it.
     ///
     /// # Errors
     /// Says whether the position is none of this log any more.

@@ -16,7 +16,8 @@ use mrol_store::{Record, frames_of};
 
 /// Bytes of frames in a message, at most: with its headers it stays below the megabyte that an engine takes by default.
 const PIECE_BYTES_MAX: usize = 768 << 10;
-/// How often a message is published before its outcome is told as unknown. An attempt takes half a second at most.
+/// How often a message is published before its outcome is told as unknown. An attempt takes half a second where nobody
+/// answers.
 const ATTEMPTS: usize = 4;
 
 /// A node's part in the log of a map.
