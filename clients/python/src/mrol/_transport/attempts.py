@@ -1,9 +1,9 @@
-"""When a request is sent again, and how soon."""
+"""When a request is sent again, where, and how soon."""
 
 import random
 import time
 
-from ..errors import ConnectFailed, ConnectionLost, MrolError, ServerError
+from ..errors import ConnectFailed, ConnectionLost, MrolError, ServerError, TransportError
 from .deadline import Deadline
 from .request import Request
 
@@ -14,14 +14,42 @@ PASSING = frozenset({"overloaded", "starting", "draining", "catalog_busy", "body
 """Reasons of refusals that are over soon. A refused request changed nothing, so it may be sent again, whatever it is."""
 
 
-class Attempts:
-    """The attempts at one call: as many as its patience and its deadline allow."""
+GOING = frozenset({"starting", "draining"})
+"""Reasons of refusals by a server that is not there yet, or no more: another one is asked."""
 
-    def __init__(self, patience_s: float, deadline: Deadline) -> None:
+LATE = "revision_not_reached"
+"""The reason of a refusal by a server that has not got the `min_revision` of a question: another one may have it."""
+
+
+class Attempts:
+    """The attempts at one call: as many as its patience and its deadline allow, and one at each of several servers at least."""
+
+    def __init__(self, patience_s: float, deadline: Deadline, servers: int = 1) -> None:
         self._patience_s = patience_s
         self._deadline = deadline
         self._failing_since: float | None = None
         self._failures = 0
+        self._servers = servers
+        # Servers that are yet to be asked before there is a pause.
+        self._others = servers - 1
+        self._unreachable: list[str] = []
+
+    def is_over_here(self, error: MrolError) -> bool:
+        """Whether later calls are to begin at another server."""
+        return self._servers > 1 and (
+            isinstance(error, TransportError) or (isinstance(error, ServerError) and error.reason in GOING)
+        )
+
+    def may_go_on(self, error: MrolError, request: Request) -> bool:
+        """Whether the call is to be sent to another server now."""
+        may = self._others > 0 and (
+            (self.is_over_here(error) and _may_be_repeated(error, request))
+            or (isinstance(error, ServerError) and error.reason == LATE)
+        )
+        self._others -= may
+        if may and isinstance(error, ConnectFailed):
+            self._unreachable.append(str(error))
+        return may
 
     def pause_after(self, error: MrolError, request: Request, was_kept: bool) -> None:
         """Waits until the request may be sent again.
@@ -39,8 +67,14 @@ class Attempts:
             return
         pause_s = self._pause_s(error)
         if now + pause_s - self._failing_since > self._patience_s or pause_s > self._deadline.remaining_s():
-            raise error
+            raise self._of_all(error)
         time.sleep(pause_s)
+
+    def _of_all(self, error: MrolError) -> MrolError:
+        """The error that names all servers, where none of several was there."""
+        if self._unreachable and isinstance(error, ConnectFailed):
+            return ConnectFailed("; ".join(dict.fromkeys([*self._unreachable, str(error)])))
+        return error
 
     def _pause_s(self, error: MrolError) -> float:
         longest_s = min(PAUSE_MAX_S, PAUSE_FIRST_S * 2 ** min(self._failures - 1, 10))
