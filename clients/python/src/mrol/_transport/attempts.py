@@ -33,6 +33,7 @@ class Attempts:
         # Servers that are yet to be asked before there is a pause.
         self._others = servers - 1
         self._unreachable: list[str] = []
+        self._first: MrolError | None = None
 
     def is_over_here(self, error: MrolError) -> bool:
         """Whether later calls are to begin at another server."""
@@ -49,7 +50,20 @@ class Attempts:
         self._others -= may
         if may and isinstance(error, ConnectFailed):
             self._unreachable.append(str(error))
+        elif may and self._first is None:
+            self._first = error
         return may
+
+    def of_all(self, error: MrolError) -> MrolError:
+        """The error of the call, where the last of several servers has failed by this one.
+
+        Of servers that were not there all are named, unless one has refused the call, or it was sent to one and lost.
+        """
+        if not isinstance(error, ConnectFailed):
+            return error
+        if self._first is not None:
+            return self._first
+        return ConnectFailed("; ".join(dict.fromkeys([*self._unreachable, str(error)]))) if self._unreachable else error
 
     def pause_after(self, error: MrolError, request: Request, was_kept: bool) -> None:
         """Waits until the request may be sent again.
@@ -67,14 +81,8 @@ class Attempts:
             return
         pause_s = self._pause_s(error)
         if now + pause_s - self._failing_since > self._patience_s or pause_s > self._deadline.remaining_s():
-            raise self._of_all(error)
+            raise self.of_all(error)
         time.sleep(pause_s)
-
-    def _of_all(self, error: MrolError) -> MrolError:
-        """The error that names all servers, where none of several was there."""
-        if self._unreachable and isinstance(error, ConnectFailed):
-            return ConnectFailed("; ".join(dict.fromkeys([*self._unreachable, str(error)])))
-        return error
 
     def _pause_s(self, error: MrolError) -> float:
         longest_s = min(PAUSE_MAX_S, PAUSE_FIRST_S * 2 ** min(self._failures - 1, 10))

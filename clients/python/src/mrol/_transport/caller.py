@@ -2,9 +2,10 @@
 
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, excerpt, server_error
 from .address import Address
@@ -19,6 +20,8 @@ from .request import Answer, Request
 from .response import Response
 from .servers import Servers
 from .stop import OpenStreams, Stop
+
+Of = TypeVar("Of")
 
 ERROR_BYTES_MAX = 1 << 20
 """Bytes of an answer that says what is wrong, of one that is read piece by piece otherwise."""
@@ -104,6 +107,13 @@ class Caller:
             else:
                 return answer
 
+    def whole(self, read: Callable[[], Of]) -> Of:
+        """What is read piece by piece to its end: anew at another of several servers, where the connection is lost."""
+        for _ in range(len(self._servers) - 1):
+            with suppress(ConnectionLost):
+                return read()
+        return read()
+
     @contextmanager
     def stream(self, request: Request, stop: Stop | None = None) -> Iterator["Body"]:
         """An answer that is read piece by piece, over a connection of its own, which is closed at the end; `stop` ends it before.
@@ -147,14 +157,12 @@ class Caller:
                 if attempts.is_over_here(error):
                     self._servers.leave(pool)
                 if not attempts.may_go_on(error, request):
-                    raise
+                    raise attempts.of_all(error) from error.__cause__
                 pool = self._servers.next(pool)
             else:
                 return pool, connection, begun, secret
 
-    def _begun(
-        self, pool: Pool, request: Request, secret: Secret, deadline: Deadline
-    ) -> tuple[Connection, "Response | Answer"]:
+    def _begun(self, pool: Pool, request: Request, secret: Secret, deadline: Deadline) -> tuple[Connection, "Response | Answer"]:
         """An answer up to its body, over a connection of its own; or all of one that names another server, without it."""
         connection, _ = self._servers.take(pool, deadline)
         try:
