@@ -42,7 +42,7 @@ class Address:
     @classmethod
     def parse_all(cls, given: "str | Sequence[str]", prefer_tls: bool = False) -> "tuple[Address, ...]":
         """The addresses of a list, or of a text in which commas separate them; each counts once."""
-        texts = list(_texts(given)) if isinstance(given, str) else given
+        texts = texts_of(given) if isinstance(given, str) else given
         if not isinstance(texts, list | tuple) or not texts:
             raise ArgumentError("address", _kind_of(given), f"{EXPECTED}, or a list of them")
         return tuple(dict.fromkeys(cls.parse(text, prefer_tls) for text in texts))
@@ -64,6 +64,11 @@ class Address:
         if self.socket_path is not None:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
+
+
+def texts_of(given: str) -> list[str]:
+    """The addresses in a text, which commas separate; a path of a socket may have commas, too."""
+    return list(_texts(given))
 
 
 def _texts(given: str) -> Iterator[str]:
