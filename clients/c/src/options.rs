@@ -138,8 +138,8 @@ fn check_address(address: &str) -> Result<(), Failure> {
     // What ends with a bracket is an address of IPv6 without a port.
     let port = place.rsplit_once(':').filter(|_| !place.ends_with(']')).map_or("", |(_, port)| port);
     if place.contains(['@', '/', '?', '#']) || !port.bytes().all(|byte| byte.is_ascii_digit()) {
-        let message = "options.address must be http://host:port, https://host:port or unix:/path, without a user, \
-            a path or a query, or several of these with commas between them; what was given is not shown";
+        let message = "options.address must be http://host:port, https://host:port or unix:/path, or several with \
+            commas between them, without a user, a path or a query; what was given is not shown";
         return Err(Failure::argument(message));
     }
     Ok(())
