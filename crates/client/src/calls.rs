@@ -295,3 +295,44 @@ fn request<M>(message: M, timeout: Option<Duration>) -> Request<M> {
     }
     request
 }
+
+#[cfg(test)]
+mod tests {
+    use tonic::Code;
+
+    use super::*;
+
+    fn refused(reason: &str) -> ClientError {
+        ClientError::Refused { code: Code::Unavailable, reason: Some(reason.into()), message: String::new() }
+    }
+
+    #[test]
+    fn only_a_refusal_that_another_server_may_not_give_is_taken_elsewhere() {
+        let next = |error: &ClientError| match Repeat::UnlessSent.after(error) {
+            Next::End => "end",
+            Next::Leave => "leave",
+            Next::Elsewhere => "elsewhere",
+        };
+        for reason in ["draining", "starting"] {
+            assert_eq!(next(&refused(reason)), "leave", "{reason}");
+        }
+        for reason in [MAP_ELSEWHERE, "revision_not_reached"] {
+            assert_eq!(next(&refused(reason)), "elsewhere", "{reason}");
+        }
+        for reason in ["overloaded", "map_not_found", "guess_required", "outcome_unknown", "key_unknown"] {
+            assert_eq!(next(&refused(reason)), "end", "{reason}");
+        }
+        assert_eq!(next(&ClientError::Foreign { url: String::new(), cause: String::new() }), "end");
+    }
+
+    #[test]
+    fn what_was_sent_is_sent_again_only_where_it_is_known_by_an_id_or_changes_nothing() {
+        let (lost, unreachable) = (
+            ClientError::Lost { url: String::new(), cause: String::new() },
+            ClientError::Unreachable { url: String::new(), cause: String::new() },
+        );
+        assert!(matches!(Repeat::UnlessSent.after(&lost), Next::End));
+        assert!(matches!(Repeat::Always.after(&lost), Next::Leave));
+        assert!(matches!(Repeat::UnlessSent.after(&unreachable), Next::Leave));
+    }
+}

@@ -152,8 +152,8 @@ impl Several {
         }
     }
 
-    /// A connection of its own to the first server, from the one in use on, that takes one: for a stream of requests, which
-    /// cannot be sent a second time.
+    /// A connection of its own to the first server, from the one in use on, that takes one: for a stream of requests,
+    /// which cannot be sent a second time.
     ///
     /// # Errors
     /// When none does.
@@ -206,9 +206,9 @@ impl Several {
     /// refusal; or else all servers, of which none was there.
     pub(super) fn failure(&self, tried: Tried) -> ClientError {
         let Tried { mut failures, .. } = tried;
-        let is_lost = |error: &ClientError| matches!(error, ClientError::Lost { .. });
+        let was_sent = |error: &ClientError| matches!(error, ClientError::Lost { .. });
         let is_other = |error: &ClientError| !matches!(error, ClientError::Unreachable { .. });
-        if let Some(first) = failures.iter().position(is_lost).or_else(|| failures.iter().position(is_other))
+        if let Some(first) = failures.iter().position(was_sent).or_else(|| failures.iter().position(is_other))
         {
             return failures.swap_remove(first);
         }
