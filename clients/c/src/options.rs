@@ -121,8 +121,8 @@ pub(crate) fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<S
     text(pointer, name)?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 
-/// The address of a server, or several with commas between them. Messages about a connection show them, so that no key or
-/// password may stand in one.
+/// The address of a server, or several with commas between them. Messages about a connection show them, so that no key
+/// or password may stand in one.
 pub(crate) fn address_of(pointer: *const std::ffi::c_char) -> Result<String, Failure> {
     let address = required(pointer, "options.address")?;
     mrol_client::addresses(&address).into_iter().try_for_each(check_address)?;

@@ -18,6 +18,10 @@ use mrol_service::Reason;
 /// Reason of a refusal by a server that does not hold the map; another one does.
 const MAP_ELSEWHERE: &str = "map_elsewhere";
 
+/// How long before its deadline a call counts as one that ran out of time: whoever waits for it as long may give up a
+/// moment before.
+const DEADLINE_MARGIN: Duration = Duration::from_millis(10);
+
 /// Makes calls.
 #[derive(Debug, Clone)]
 pub(super) struct Calls {
@@ -282,7 +286,7 @@ struct Waiting<'c> {
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        if self.until.is_some_and(|until| until <= Instant::now()) {
+        if self.until.is_some_and(|until| until <= Instant::now() + DEADLINE_MARGIN) {
             self.connection.give_up();
         }
     }

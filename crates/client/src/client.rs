@@ -39,10 +39,11 @@ impl Client {
     /// `https://robot-7:7334`; or `unix:/run/mrol/grpc.sock`, a socket on the same machine.
     ///
     /// Several addresses, separated by commas, are those of servers of the same maps. The client uses the first that
-    /// answers, and goes on at the next when that one is gone: when it takes no connection (each address is given 3 s at
-    /// most), loses one, or says that it goes down. It asks questions again there, and sends a change again if it was not
-    /// sent before or has a `scan_id` or `request_id`. Any other change ends with [`ClientError::Lost`]: the outcome is
-    /// unknown. A call tries each address once, and those whose connection was lost once more, within one deadline.
+    /// answers, and goes on at the next when that one is gone: when it takes no connection (each address is given 3 s
+    /// at most), loses one, or says that it goes down. It asks questions again there, and sends a change again if it
+    /// was not sent before or has a `scan_id` or `request_id`. Any other change ends with [`ClientError::Lost`]: the
+    /// outcome is unknown. A call tries each address once, and those whose connection was lost once more, within one
+    /// deadline.
     ///
     /// Questions that take a `min_revision` wait for the last revision that an answer about the map has named, so that
     /// the map never goes back; listings, blocks, trajectories and descriptions do not.

@@ -26,8 +26,8 @@ impl Client {
         self.calls.with_timeout(None).ask(message, open).await
     }
 
-    /// Waits for one of several servers that has the revision from which a watch goes on: one that is behind would tell of
-    /// an older state. Where none has it the watch begins all the same, as after an older data folder was put back.
+    /// Waits for one of several servers that has the revision from which a watch goes on: one that is behind would tell
+    /// of an older state. Where none has it the watch begins all the same, as after an older data folder was put back.
     pub(super) async fn wait_to_go_on(&self, map: &MapName, since: &WatchedSince) {
         if self.calls.has_several() {
             let query = PointQuery {

@@ -134,6 +134,18 @@ async fn a_server_that_answers_nothing_is_left_when_the_time_of_a_call_is_up() {
 }
 
 #[tokio::test]
+async fn a_server_that_answers_nothing_is_left_by_a_caller_that_waits_no_longer_than_the_deadline() {
+    let (_daemon, first, _second, client) = with_two_lines().await;
+    let deadline = Duration::from_millis(300);
+    let client = client.with_timeout(deadline);
+    first.mute();
+    if let Ok(answer) = tokio::time::timeout(deadline, asked(&client)).await {
+        answer.unwrap_err();
+    }
+    assert_eq!(asked(&client).await.unwrap().points_occupied, 1);
+}
+
+#[tokio::test]
 async fn a_change_without_an_id_that_was_sent_is_lost_and_made_once() {
     let (daemon, first, second, client) = with_two_lines().await;
     first.mute();
@@ -150,6 +162,18 @@ async fn a_change_without_an_id_that_was_sent_is_lost_and_made_once() {
     let other = Deletion { target: DeletionTarget::Points(points_at(row(2)[1])), ..deletion(None) };
     assert!(!client.delete_voxels(&map(), other).await.unwrap().replayed);
     assert!(second.sent_bytes() > 0);
+}
+
+#[tokio::test]
+async fn a_change_without_an_id_goes_elsewhere_where_its_connection_was_gone_before() {
+    let (daemon, first, second, client) = with_two_lines().await;
+    first.cut().await;
+    // Until the client has seen the end of its connection.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let answer = client.delete_voxels(&map(), deletion(None)).await.unwrap();
+    assert_eq!((answer.removed, answer.version.revision), (1, 2));
+    assert!(second.sent_bytes() > 0);
+    assert_eq!(daemon.contents(MAP).await.0, 2);
 }
 
 #[tokio::test]
