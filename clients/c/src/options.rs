@@ -133,7 +133,7 @@ fn check_address(address: &str) -> Result<(), Failure> {
     if address.starts_with("unix:") {
         return Ok(());
     }
-    let place = address.split_once("://").map_or(&*address, |(_, place)| place);
+    let place = address.split_once("://").map_or(address, |(_, place)| place);
     let place = place.strip_suffix('/').unwrap_or(place);
     // What ends with a bracket is an address of IPv6 without a port.
     let port = place.rsplit_once(':').filter(|_| !place.ends_with(']')).map_or("", |(_, port)| port);

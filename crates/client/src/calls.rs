@@ -257,9 +257,9 @@ where
     let mut tried = Tried::default();
     while let Some((place, connection)) = several.connection(&mut tried, until).await {
         let left = until.map(|until| until.saturating_duration_since(Instant::now()));
-        let waiting = Waiting { connection: &connection, until };
+        let mut waiting = Waiting { connection: &connection, until };
         let answer = send(connection.clone(), request(message.clone(), left)).await;
-        drop(waiting);
+        waiting.until = None;
         let error = match answer {
             Ok(answer) => return Ok(answer),
             Err(error) => error,
@@ -278,7 +278,7 @@ where
     Err(several.failure(tried))
 }
 
-/// A call under way. Where it has no answer when its time is up, the server may hang: later calls go to another.
+/// A call under way. Where it is dropped when its time is up, the server may hang: later calls go to another.
 struct Waiting<'c> {
     connection: &'c Connection,
     until: Option<Instant>,
