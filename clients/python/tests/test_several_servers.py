@@ -304,6 +304,14 @@ def test_a_server_that_goes_down_is_left_at_once(server: Server) -> None:
         assert (first.requests, client.address) == (1, f"http://{server.address}")
 
 
+def test_a_connection_that_the_server_closed_while_it_was_kept_is_made_anew_there(server: Server) -> None:
+    with ScriptedServer(lambda sock, _: sock.sendall(answer(b'{"maps":[]}'))) as first:
+        client = mrol.connect([first.address, server.address])
+        for _ in range(50):
+            client.maps()
+        assert (first.requests, client.address) == (50, f"http://{first.address}")
+
+
 def test_a_key_is_refused_by_each_server_as_by_one(tmp_path: Path) -> None:
     keys = tmp_path / "keys.toml"
     secret = run("key", "new", "--name", "k", "--scope", "admin", "--file", str(keys)).strip()

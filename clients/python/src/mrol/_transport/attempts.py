@@ -34,6 +34,18 @@ class Attempts:
         self._others = servers - 1
         self._unreachable: list[str] = []
         self._first: MrolError | None = None
+        self._has_renewed = False
+
+    def may_renew(self, error: MrolError, request: Request, was_kept: bool) -> bool:
+        """Whether the call is to be sent to the same one of several servers again, over a new connection: once.
+
+        A connection that was kept may have been closed by a server that is there.
+        """
+        may = (
+            self._servers > 1 and was_kept and not self._has_renewed and isinstance(error, ConnectionLost) and request.is_repeatable
+        )
+        self._has_renewed |= may
+        return may
 
     def is_over_here(self, error: MrolError) -> bool:
         """Whether later calls are to begin at another server."""

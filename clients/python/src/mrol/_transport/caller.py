@@ -97,6 +97,8 @@ class Caller:
                     raise
                 may_renew = False
             except (ServerError, TransportError) as error:
+                if attempts.may_renew(error, request, was_kept):
+                    continue
                 if attempts.is_over_here(error):
                     self._servers.leave(pool)
                 if attempts.may_go_on(error, request):

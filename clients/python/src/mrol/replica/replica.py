@@ -48,11 +48,11 @@ class Replica(InProcessMap):
     `address` is the server's gRPC address, `http://127.0.0.1:7334` or `unix:/run/mrol/grpc.sock`; `https://` with `ca`, the path of
     the PEM file of the authority, where it is not one that the system trusts. An address with a user, a path or a query is refused,
     and not shown: `key` is the caller's secret. Several, in a list or with commas between them, are those of servers of the same
-    maps: the copy follows one of them until it is gone, then the next. `region` copies the voxels of a box alone, and then questions are refused that what
-    lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each block of 8 x 8 x 8 voxels). With
-    `bloom` it has filters, without `viewpoints` it does not know what is free. Where the connection breaks it comes back by itself;
-    `status` tells. With `age_max_s`, more than the server's `watch_heartbeat_s`, questions raise `Unavailable` (`replica_stale`)
-    where the server was heard longer ago; without, answers may be of any age.
+    maps: the copy follows one of them until it is gone, then the next. `region` copies the voxels of a box alone, and then
+    questions are refused that what lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each
+    block of 8 x 8 x 8 voxels). With `bloom` it has filters, without `viewpoints` it does not know what is free. Where the
+    connection breaks it comes back by itself; `status` tells. With `age_max_s`, more than the server's `watch_heartbeat_s`,
+    questions raise `Unavailable` (`replica_stale`) where the server was heard longer ago; without, answers may be of any age.
 
     Raises `ConnectFailed`, `NotFound` (`map_not_found`), `Unauthenticated`, `PermissionDenied`, `TimedOut`.
     """
