@@ -8,7 +8,8 @@ use mrol::console::{CliError, CredentialOptions};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ServerOptions {
-    /// The gRPC address of the server: http://, https:// or unix:PATH
+    /// The gRPC address of the server: http://, https:// or unix:PATH; several of servers of the same maps, with commas
+    /// between them: the first that answers
     #[arg(long, env = "MROL_SERVER", default_value = "http://127.0.0.1:7334", value_name = "URL")]
     server: String,
     #[command(flatten)]

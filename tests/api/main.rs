@@ -26,6 +26,7 @@ mod renaming;
 mod scan_requests;
 mod sensors;
 mod sessions;
+mod several_servers;
 #[path = "../support/mod.rs"]
 mod support;
 mod trajectory;

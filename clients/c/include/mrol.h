@@ -44,6 +44,12 @@
  *
  * CLIENTS. What is said of replicas here holds of connections, mrol_client, too.
  *
+ * SEVERAL SERVERS. An address may be a list, "http://node-1:7334,http://node-2:7334", of servers of the same maps. The first that
+ * answers is used until it is gone, then the next. A question is asked again there, and so is a scan with a scan_id; a change
+ * without an id is sent again only if it was not sent before, and ends with MROL_UNREACHABLE otherwise: it may have been made.
+ * All of it counts to the timeout of the call. Point queries wait for the last revision that any of the servers has told, so that
+ * the map never goes back.
+ *
  * SIGNALS. No function is safe in a signal handler.
  */
 #ifndef MROL_H
@@ -141,7 +147,8 @@ typedef struct mrol_replica_options {
     /* sizeof(mrol_replica_options) where the program was compiled. */
     size_t struct_size;
     /* gRPC address of the server: "http://127.0.0.1:7334", "https://robot-7:7334" or "unix:/run/mrol/grpc.sock". One with a
-     * user, a path or a query is refused: errors show the address, and a key in it would be in them. */
+     * user, a path or a query is refused: errors show the address, and a key in it would be in them. Several with commas
+     * between them are servers of the same maps: see SEVERAL SERVERS. */
     const char *address;
     /* Name of the map. */
     const char *map;

@@ -121,22 +121,28 @@ pub(crate) fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<S
     text(pointer, name)?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 
-/// The address of a server. Messages about a connection show it, so that no key or password may stand in it.
+/// The address of a server, or several with commas between them. Messages about a connection show them, so that no key
+/// or password may stand in one.
 pub(crate) fn address_of(pointer: *const std::ffi::c_char) -> Result<String, Failure> {
     let address = required(pointer, "options.address")?;
+    mrol_client::addresses(&address).into_iter().try_for_each(check_address)?;
+    Ok(address)
+}
+
+fn check_address(address: &str) -> Result<(), Failure> {
     if address.starts_with("unix:") {
-        return Ok(address);
+        return Ok(());
     }
-    let place = address.split_once("://").map_or(&*address, |(_, place)| place);
+    let place = address.split_once("://").map_or(address, |(_, place)| place);
     let place = place.strip_suffix('/').unwrap_or(place);
     // What ends with a bracket is an address of IPv6 without a port.
     let port = place.rsplit_once(':').filter(|_| !place.ends_with(']')).map_or("", |(_, port)| port);
     if place.contains(['@', '/', '?', '#']) || !port.bytes().all(|byte| byte.is_ascii_digit()) {
-        let message = "options.address must be http://host:port, https://host:port or unix:/path, without a user, \
-            a path or a query; what was given is not shown";
+        let message = "options.address must be http://host:port, https://host:port or unix:/path, or several with \
+            commas between them, without a user, a path or a query; what was given is not shown";
         return Err(Failure::argument(message));
     }
-    Ok(address)
+    Ok(())
 }
 
 fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Failure> {
@@ -172,6 +178,8 @@ mod tests {
             "http://[::1]",
             "unix:/run/a@b.sock",
             "unix:///run/mrol.sock",
+            "http://node-1:7334,http://node-2:7334",
+            "node-1:7334, unix:/run/a,b/c.sock,https://[::1]/",
         ] {
             assert_eq!(refusal(good), None, "{good}");
         }
@@ -184,6 +192,8 @@ mod tests {
             "http://host?SECRET",
             "http://host#SECRET",
             "http://host:SECRET",
+            "http://host:1,http://u:SECRET@host",
+            "unix:/run/mrol.sock,http://host/SECRET",
         ] {
             let message = refusal(bad).unwrap_or_default();
             assert!(

@@ -293,7 +293,7 @@ struct ray_hit {
 // Options of a replica: those of mrol.h, which has them all.
 using replica_options = mrol_replica_options;
 
-// A copy of a map in this process, which follows the server's.
+// A copy of a map in this process, which follows the server's; an address may be a list, as mrol.h says of several servers.
 class replica : public detail::owned<mrol_replica, mrol_replica_close> {
 public:
     replica(const std::string &address, const std::string &map) : replica(options_for(address, map)) {}
@@ -527,7 +527,8 @@ private:
     mrol_localization_answer answer_;
 };
 
-// Calls to a server. Threads may share it.
+// Calls to a server. Threads may share it. An address may be a list of servers of the same maps with commas between them: the
+// next is used when one is gone.
 class client : public detail::owned<mrol_client, mrol_client_close> {
 public:
     explicit client(const std::string &address, const std::string &key = "") : client(options_for(address, key)) {}

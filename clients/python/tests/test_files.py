@@ -249,7 +249,7 @@ def test_what_a_progress_raises_comes_out_unchanged(hall: mrol.Map, tmp_path: Pa
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.mrol", "hall.mrol"]
     assert hall.describe().version == of_hall
     assert threading.active_count() == threads
-    assert len(hall._caller._pool._connections.used) == 0  # noqa: SLF001
+    assert len(hall._caller._servers.current._connections.used) == 0  # noqa: SLF001
 
 
 def test_a_server_that_hangs_up_is_told_as_such(tmp_path: Path) -> None:

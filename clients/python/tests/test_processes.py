@@ -162,7 +162,7 @@ def test_ctrl_c_ends_a_call_to_a_server_that_hangs() -> None:
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_ctrl_c_at_any_line_of_a_call_leaves_no_connection_in_use(hall: mrol.Map) -> None:
     """Each line that is run for a query is interrupted once, before its first instruction."""
-    pool = hall._caller._pool  # noqa: SLF001
+    pool = hall._caller._servers.current  # noqa: SLF001
     pool.close()
     for is_kept in (True, False):
         for line in itertools.count(1):

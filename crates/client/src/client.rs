@@ -3,13 +3,16 @@
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
+use tonic::Request;
 use tonic::transport::Channel;
-use tonic::{Request, Response, Status};
 
+use super::answers::Answers;
+use super::calls::Calls;
 use super::connection::Connection;
 use super::credentials::Credentials;
 use super::error::ClientError;
 use super::new_map::NewMap;
+use super::servers::Servers;
 use crate::wire::{pb, restore_pieces};
 use mrol_map::map::{MapName, RobotName, SessionName};
 use mrol_service::{
@@ -19,11 +22,10 @@ use mrol_service::{
     VoxelListing,
 };
 
-/// A connection to a server.
+/// A connection to a server, or to one of several that serve the same maps.
 #[derive(Debug, Clone)]
 pub struct Client {
-    pub(super) connection: Connection,
-    timeout: Option<Duration>,
+    pub(super) calls: Calls,
 }
 
 /// A name for the session of a robot's program that starts, unlike any other: scans are counted from 0 in it.
@@ -36,6 +38,16 @@ impl Client {
     /// Connects to the gRPC address of a server that asks for no key: `http://127.0.0.1:7334`, or without the scheme;
     /// `https://robot-7:7334`; or `unix:/run/mrol/grpc.sock`, a socket on the same machine.
     ///
+    /// Several addresses, separated by commas, are those of servers of the same maps. The client uses the first that
+    /// answers, and goes on at the next when that one is gone: when it takes no connection (each address is given 3 s
+    /// at most), loses one, or says that it goes down. It asks questions again there, and sends a change again if it
+    /// was not sent before or has a `scan_id` or `request_id`. Any other change ends with [`ClientError::Lost`]: the
+    /// outcome is unknown. A call tries each address once, and those whose connection was lost once more, within one
+    /// deadline.
+    ///
+    /// Questions that take a `min_revision` wait for the last revision that an answer about the map has named, so that
+    /// the map never goes back; listings, blocks, trajectories and descriptions do not.
+    ///
     /// # Errors
     /// When the address is not valid, or no server answers there.
     pub async fn connect(url: &str) -> Result<Self, ClientError> {
@@ -47,18 +59,18 @@ impl Client {
     /// # Errors
     /// When the address is not valid, no server answers there, or the two do not trust each other.
     pub async fn connect_with(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
-        Ok(Self { connection: Connection::open(url, credentials).await?, timeout: None })
+        Ok(Self { calls: Calls::new(Servers::connect(url, credentials).await?) })
     }
 
     /// The underlying channel, without the key: for other services of the server, such as gRPC's health protocol.
     pub fn channel(&self) -> Channel {
-        self.connection.channel()
+        self.calls.channel()
     }
 
     /// Sets a deadline for every call that is not a stream. The server gives up at the deadline, and waits for a
     /// `min_revision` until then.
     pub fn with_timeout(self, timeout: Duration) -> Self {
-        Self { timeout: Some(timeout), ..self }
+        Self { calls: self.calls.with_timeout(Some(timeout)) }
     }
 
     /// Creates a map, and returns its description and whether it is new. A map of that name with the same settings is
@@ -67,8 +79,9 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn create_map(&self, map: &MapName, settings: NewMap) -> Result<(MapInfo, bool), ClientError> {
-        let request = self.request((map, settings));
-        self.domain(self.connection.maps().create_map(request).await)
+        let message = pb::CreateMapRequest::from((map, settings));
+        let send = |on: Connection, request| async move { on.domain(on.maps().create_map(request).await) };
+        self.calls.change(map, false, message, send).await
     }
 
     /// Describes a map.
@@ -76,8 +89,9 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn map_info(&self, map: &MapName) -> Result<MapInfo, ClientError> {
-        let request = self.request(pb::GetMapRequest { map: map.to_string() });
-        self.domain(self.connection.maps().get_map(request).await)
+        let message = pb::GetMapRequest { map: map.to_string() };
+        let send = |on: Connection, request| async move { on.domain(on.maps().get_map(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 
     /// Describes all maps, sorted by name; those that could not be opened with the reason and the remedy.
@@ -85,8 +99,8 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn list_maps(&self) -> Result<MapList, ClientError> {
-        let request = self.request(pb::ListMapsRequest {});
-        self.domain(self.connection.maps().list_maps(request).await)
+        let send = |on: Connection, request| async move { on.domain(on.maps().list_maps(request).await) };
+        self.calls.ask(pb::ListMapsRequest {}, send).await
     }
 
     /// Gives a map another name, which no map has; its uuid, its revision and its robots stay. Watches and changes that
@@ -95,8 +109,9 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn rename_map(&self, map: &MapName, to: &MapName) -> Result<MapInfo, ClientError> {
-        let request = self.request(pb::RenameMapRequest { map: map.to_string(), to: to.to_string() });
-        self.domain(self.connection.maps().rename_map(request).await)
+        let message = pb::RenameMapRequest { map: map.to_string(), to: to.to_string() };
+        let send = |on: Connection, request| async move { on.domain(on.maps().rename_map(request).await) };
+        self.calls.change(to, false, message, send).await
     }
 
     /// Deletes a map, in memory and on disk.
@@ -104,9 +119,12 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn delete_map(&self, map: &MapName) -> Result<(), ClientError> {
-        let request = self.request(pb::DeleteMapRequest { map: map.to_string() });
-        let answer = self.connection.maps().delete_map(request).await;
-        answer.map(|_| ()).map_err(|status| self.connection.failure(&status))
+        let message = pb::DeleteMapRequest { map: map.to_string() };
+        let send = |on: Connection, request| async move {
+            let answer = on.maps().delete_map(request).await;
+            answer.map(|_| ()).map_err(|status| on.failure(&status))
+        };
+        self.calls.change_of_none(message, send).await
     }
 
     /// Returns the map as the bytes of a map file, at one revision.
@@ -114,14 +132,17 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn snapshot_map(&self, map: &MapName) -> Result<Bytes, ClientError> {
-        let request = Request::new(pb::SnapshotMapRequest { map: map.to_string() });
-        let failure = |status| self.connection.failure(&status);
-        let mut pieces = self.connection.maps().snapshot_map(request).await.map_err(failure)?.into_inner();
-        let mut file = BytesMut::new();
-        while let Some(piece) = pieces.message().await.map_err(failure)? {
-            file.extend_from_slice(&piece.data);
-        }
-        Ok(file.freeze())
+        let message = pb::SnapshotMapRequest { map: map.to_string() };
+        let read = |on: Connection, request| async move {
+            let failure = |status| on.failure(&status);
+            let mut pieces = on.maps().snapshot_map(request).await.map_err(failure)?.into_inner();
+            let mut file = BytesMut::new();
+            while let Some(piece) = pieces.message().await.map_err(failure)? {
+                file.extend_from_slice(&piece.data);
+            }
+            Ok(file.freeze())
+        };
+        self.calls.with_timeout(None).ask(message, read).await
     }
 
     /// Creates a map from a map file. The map gets a new uuid.
@@ -142,8 +163,12 @@ impl Client {
     }
 
     async fn restore(&self, map: &MapName, file: Bytes, replace: bool) -> Result<MapInfo, ClientError> {
-        let pieces = tokio_stream::iter(restore_pieces(map, file, replace));
-        self.domain(self.connection.maps().restore_map(pieces).await)
+        let send = |on: Connection, request: Request<(MapName, Bytes)>| async move {
+            let (map, file) = request.into_inner();
+            let pieces = tokio_stream::iter(restore_pieces(&map, file, replace));
+            on.domain(on.maps().restore_map(pieces).await)
+        };
+        self.calls.with_timeout(None).change(map, false, (map.clone(), file), send).await
     }
 
     /// Returns for each point whether its voxel is occupied, all at one revision.
@@ -151,8 +176,10 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ClientError> {
-        let request = self.request((map, query));
-        self.domain(self.connection.occupancy().query_points(request).await)
+        let message = pb::QueryPointsRequest::from((map, query));
+        let send =
+            |on: Connection, request| async move { on.domain(on.occupancy().query_points(request).await) };
+        self.calls.question(map, message, send).await
     }
 
     /// Lists the occupied voxels of a level, in a region or everywhere, all at one revision.
@@ -164,14 +191,16 @@ impl Client {
         map: &MapName,
         request: ListingRequest,
     ) -> Result<VoxelListing, ClientError> {
-        let request = self.request((map, request));
-        let chunks = self.connection.occupancy().list_voxels(request).await;
-        let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;
-        let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_message("listing")))?;
-        while let Some(chunk) = chunks.next().await {
-            listing.keys.extend(chunk?.keys);
-        }
-        Ok(listing)
+        let message = pb::ListVoxelsRequest::from((map, request));
+        let read = |on: Connection, request| async move {
+            let mut chunks: Answers<VoxelListing> = on.answers(on.occupancy().list_voxels(request).await)?;
+            let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_message("listing")))?;
+            while let Some(chunk) = chunks.next().await {
+                listing.keys.extend(chunk?.keys);
+            }
+            Ok(listing)
+        };
+        self.calls.ask_about(map, message, read).await
     }
 
     /// Returns a part of a level as it is stored, or the distance of each of its cells from what is occupied, at one
@@ -180,8 +209,10 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn get_block(&self, map: &MapName, request: BlockRequest) -> Result<BlockAnswer, ClientError> {
-        let request = self.request((map, request));
-        self.domain(self.connection.occupancy().get_block(request).await)
+        let message = pb::GetBlockRequest::from((map, request));
+        let send =
+            |on: Connection, request| async move { on.domain(on.occupancy().get_block(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 
     /// Lists the scans that touched a voxel and were not undone, newest first, as far back as the journal reaches.
@@ -193,8 +224,10 @@ impl Client {
         map: &MapName,
         request: ObserversRequest,
     ) -> Result<ObserversAnswer, ClientError> {
-        let request = self.request((map, request));
-        self.domain(self.connection.occupancy().list_observers(request).await)
+        let message = pb::ListObserversRequest::from((map, request));
+        let send =
+            |on: Connection, request| async move { on.domain(on.occupancy().list_observers(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 
     /// Aligns a scan and, where it fits, adds it. A scan that does not align is an answer, not an error.
@@ -202,8 +235,11 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ClientError> {
-        let request = self.request((map, scan));
-        self.domain(self.connection.mapping().insert_scan(request).await)
+        let with_id = scan.scan_id.is_some();
+        let message = pb::InsertScanRequest::from((map, scan));
+        let send =
+            |on: Connection, request| async move { on.domain(on.mapping().insert_scan(request).await) };
+        self.calls.change(map, with_id, message, send).await
     }
 
     /// Aligns a scan and returns what [`Client::insert_scan`] would; changes nothing.
@@ -211,8 +247,9 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ClientError> {
-        let request = self.request((map, scan));
-        self.domain(self.connection.mapping().align_scan(request).await)
+        let message = pb::AlignScanRequest::from((map, scan));
+        let send = |on: Connection, request| async move { on.domain(on.mapping().align_scan(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 
     /// Finds where in the map a scan was taken, without a guess. A scan that fits nowhere is an answer, not an error.
@@ -224,8 +261,9 @@ impl Client {
         map: &MapName,
         scan: LocalizationRequest,
     ) -> Result<LocalizationAnswer, ClientError> {
-        let request = self.request((map, scan));
-        self.domain(self.connection.mapping().localize(request).await)
+        let message = pb::LocalizeRequest::from((map, scan));
+        let send = |on: Connection, request| async move { on.domain(on.mapping().localize(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 
     /// Deletes voxels, with all their descendants.
@@ -237,8 +275,11 @@ impl Client {
         map: &MapName,
         deletion: Deletion,
     ) -> Result<DeletionAnswer, ClientError> {
-        let request = self.request((map, deletion));
-        self.domain(self.connection.mapping().delete_voxels(request).await)
+        let with_id = deletion.request_id.is_some();
+        let message = pb::DeleteVoxelsRequest::from((map, deletion));
+        let send =
+            |on: Connection, request| async move { on.domain(on.mapping().delete_voxels(request).await) };
+        self.calls.change(map, with_id, message, send).await
     }
 
     /// Removes scans from the map; voxels that other scans touched stay.
@@ -246,8 +287,10 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ClientError> {
-        let request = self.request((map, undo));
-        self.domain(self.connection.mapping().undo(request).await)
+        let with_id = undo.request_id.is_some();
+        let message = pb::UndoRequest::from((map, undo));
+        let send = |on: Connection, request| async move { on.domain(on.mapping().undo(request).await) };
+        self.calls.change(map, with_id, message, send).await
     }
 
     /// Returns the poses of the accepted scans, of one robot or of all robots, all pages at one revision.
@@ -260,13 +303,16 @@ impl Client {
         robot: Option<&RobotName>,
     ) -> Result<TrajectoryAnswer, ClientError> {
         let query = TrajectoryQuery { robot: robot.cloned(), ..TrajectoryQuery::default() };
-        let pieces = self.connection.mapping().stream_trajectory(self.request((map, query))).await;
-        let mut pieces = self.connection.answers::<_, TrajectoryAnswer>(pieces)?;
-        let mut all = pieces.next().await.unwrap_or_else(|| Err(missing_message("trajectory")))?;
-        while let Some(piece) = pieces.next().await {
-            all.poses.extend(piece?.poses);
-        }
-        Ok(all)
+        let read = |on: Connection, request| async move {
+            let mut pieces: Answers<TrajectoryAnswer> =
+                on.answers(on.mapping().stream_trajectory(request).await)?;
+            let mut all = pieces.next().await.unwrap_or_else(|| Err(missing_message("trajectory")))?;
+            while let Some(piece) = pieces.next().await {
+                all.poses.extend(piece?.poses);
+            }
+            Ok(all)
+        };
+        self.calls.ask_about(map, pb::StreamTrajectoryRequest::from((map, query)), read).await
     }
 
     /// Returns one page of the poses of the accepted scans; the answer says where the next page begins.
@@ -278,24 +324,10 @@ impl Client {
         map: &MapName,
         query: TrajectoryQuery,
     ) -> Result<TrajectoryAnswer, ClientError> {
-        let request = self.request((map, query));
-        self.domain(self.connection.mapping().get_trajectory(request).await)
-    }
-
-    pub(super) fn request<M>(&self, message: impl Into<M>) -> Request<M> {
-        let mut request = Request::new(message.into());
-        if let Some(timeout) = self.timeout {
-            request.set_timeout(timeout);
-        }
-        request
-    }
-
-    pub(super) fn domain<M, T>(&self, answer: Result<Response<M>, Status>) -> Result<T, ClientError>
-    where
-        M: TryInto<T, Error = ServiceError>,
-    {
-        let answer = answer.map_err(|status| self.connection.failure(&status))?;
-        answer.into_inner().try_into().map_err(ClientError::Answer)
+        let message = pb::GetTrajectoryRequest::from((map, query));
+        let send =
+            |on: Connection, request| async move { on.domain(on.mapping().get_trajectory(request).await) };
+        self.calls.ask_about(map, message, send).await
     }
 }
 

@@ -3,12 +3,13 @@
 use std::error::Error;
 use std::io;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tokio_stream::StreamExt;
 use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
-use tonic::{Response, Status, Streaming};
+use tonic::{ConnectError, Response, Status, Streaming};
 
 use super::answers::Answers;
 use super::credentials::{Credentials, ShownKey};
@@ -27,6 +28,8 @@ pub(super) struct Connection {
     channel: Channel,
     key: ShownKey,
     url: Arc<str>,
+    /// Of a client with several addresses: true once the server was found to be gone, or said that it goes.
+    is_gone: Option<Arc<AtomicBool>>,
 }
 
 /// A channel that adds the key to every call.
@@ -42,15 +45,23 @@ impl Connection {
         credentials: &Credentials,
         timeout: Duration,
     ) -> Result<Self, ClientError> {
-        let (url, endpoint) = endpoint(url, credentials)?;
-        let connecting = endpoint.connect_timeout(timeout);
-        match tokio::time::timeout(timeout, connecting.connect()).await {
-            Ok(Ok(channel)) => Ok(Self { channel, key: credentials.key(), url: url.into() }),
-            Ok(Err(error)) if !is_timeout(&error) => Err(ClientError::unreachable(url, &error)),
-            Ok(Err(_)) | Err(_) => {
-                let cause = format!("no answer within {} s", timeout.as_secs_f64());
-                Err(ClientError::Unreachable { url, cause })
-            }
+        Address::parse(url, credentials)?.connect(credentials, timeout).await
+    }
+
+    /// The same connection, as one of a client that has other addresses too.
+    pub(super) fn among_others(self) -> Self {
+        Self { is_gone: Some(Arc::default()), ..self }
+    }
+
+    /// True once a call over this connection found the server gone.
+    pub(super) fn is_gone(&self) -> bool {
+        self.is_gone.as_ref().is_some_and(|gone| gone.load(Ordering::Relaxed))
+    }
+
+    /// Lets later calls use another address.
+    pub(super) fn give_up(&self) {
+        if let Some(gone) = &self.is_gone {
+            gone.store(true, Ordering::Relaxed);
         }
     }
 
@@ -73,8 +84,26 @@ impl Connection {
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
+    /// The error that a status is. Where there are other addresses, one that never was sent is told from one that was.
     pub(super) fn failure(&self, status: &Status) -> ClientError {
-        ClientError::of(&self.url, status)
+        let error = ClientError::of(&self.url, status);
+        if self.is_gone.is_none() || !matches!(error, ClientError::Lost { .. }) {
+            return error;
+        }
+        self.give_up();
+        match status.source().and_then(unsent) {
+            Some(cause) => ClientError::Unreachable { url: self.url.to_string(), cause: root_cause(cause) },
+            None => error,
+        }
+    }
+
+    /// Converts an answer to domain types.
+    pub(super) fn domain<M, T>(&self, answer: Result<Response<M>, Status>) -> Result<T, ClientError>
+    where
+        M: TryInto<T, Error = ServiceError>,
+    {
+        let answer = answer.map_err(|status| self.failure(&status))?;
+        answer.into_inner().try_into().map_err(ClientError::Answer)
     }
 
     /// Converts the messages of a stream to domain types.
@@ -93,6 +122,60 @@ impl Connection {
             answer.try_into().map_err(ClientError::Answer)
         })))
     }
+}
+
+/// Where a server is, and how it is connected to.
+#[derive(Debug, Clone)]
+pub(super) struct Address {
+    /// In full, with its scheme.
+    pub(super) url: String,
+    endpoint: Endpoint,
+}
+
+impl Address {
+    /// Parses an address.
+    ///
+    /// # Errors
+    /// When it is not valid, or of no use with these credentials.
+    pub(super) fn parse(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
+        let (url, endpoint) = endpoint(url, credentials)?;
+        Ok(Self { url, endpoint })
+    }
+
+    /// A channel that connects when it is used. It must be called in a runtime.
+    pub(super) fn lazy_channel(&self) -> Channel {
+        self.endpoint.connect_lazy()
+    }
+
+    /// Connects within `timeout`.
+    ///
+    /// # Errors
+    /// When no server answers there, or the two do not trust each other.
+    pub(super) async fn connect(
+        &self,
+        credentials: &Credentials,
+        timeout: Duration,
+    ) -> Result<Connection, ClientError> {
+        let url = self.url.clone();
+        let connecting = self.endpoint.clone().connect_timeout(timeout);
+        match tokio::time::timeout(timeout, connecting.connect()).await {
+            Ok(Ok(channel)) => {
+                Ok(Connection { channel, key: credentials.key(), url: url.into(), is_gone: None })
+            }
+            Ok(Err(error)) if !is_timeout(&error) => Err(ClientError::unreachable(url, &error)),
+            Ok(Err(_)) | Err(_) => {
+                let cause = format!("no answer within {} s", timeout.as_secs_f64());
+                Err(ClientError::Unreachable { url, cause })
+            }
+        }
+    }
+}
+
+/// The error in a chain of causes that says that nothing was sent: no connection was made, or it had ended before the
+/// request's turn came, which hyper calls canceled.
+fn unsent<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e (dyn Error + 'static)> {
+    let is_canceled = error.downcast_ref::<hyper::Error>().is_some_and(hyper::Error::is_canceled);
+    if is_canceled || error.is::<ConnectError>() { Some(error) } else { error.source().and_then(unsent) }
 }
 
 /// True of an error that comes of the time which connecting may take.

@@ -2,6 +2,7 @@
 
 use super::answers::Answers;
 use super::client::Client;
+use super::connection::Connection;
 use super::error::ClientError;
 use crate::wire::pb;
 use mrol_map::map::MapName;
@@ -17,8 +18,10 @@ impl Client {
         map: &MapName,
         query: EventsQuery,
     ) -> Result<Vec<ScanEvent>, ClientError> {
-        let request: tonic::Request<pb::ListEventsRequest> = self.request((map, query));
-        self.domain(self.connection.mapping().list_events(request).await)
+        let message = pb::ListEventsRequest::from((map, query));
+        let send =
+            |on: Connection, request| async move { on.domain(on.mapping().list_events(request).await) };
+        self.calls.ask(message, send).await
     }
 
     /// Tells of the events that [`Client::list_events`] would return, then of each as it comes. It goes on until the
@@ -31,8 +34,9 @@ impl Client {
         map: &MapName,
         query: EventsQuery,
     ) -> Result<Answers<EventMessage>, ClientError> {
-        let request = pb::WatchEventsRequest::from((map, query));
-        let answers = self.connection.mapping().watch_events(request).await;
-        self.connection.answers(answers)
+        let message = pb::WatchEventsRequest::from((map, query));
+        let open =
+            |on: Connection, request| async move { on.answers(on.mapping().watch_events(request).await) };
+        self.calls.with_timeout(None).ask(message, open).await
     }
 }

@@ -26,7 +26,9 @@
 //! A [`Client`] is a handle on one connection: clones share it, and calls on it run at the same time. The domain types
 //! that it takes are those of the map and of the service, whose modules are here too.
 
+mod addresses;
 mod answers;
+mod calls;
 mod client;
 mod connection;
 mod credentials;
@@ -36,10 +38,13 @@ mod keep_outs;
 mod new_map;
 mod question;
 mod replica;
+mod servers;
 mod streams;
+mod told_revisions;
 mod watch;
 pub mod wire;
 
+pub use addresses::addresses;
 pub use answers::Answers;
 pub use client::{Client, new_session};
 pub use credentials::Credentials;

@@ -22,11 +22,11 @@ impl Client {
         map: &MapName,
         scans: impl Stream<Item = ScanRequest> + Send + 'static,
     ) -> Result<Answers<ScanAnswer>, ClientError> {
-        let map = map.clone();
-        let requests = scans.map(move |scan| pb::InsertScanRequest::from((&map, scan)));
-        let answers = self.connection.mapping().insert_scan_stream(requests).await;
-        let answers: Answers<Inserted> = self.connection.answers(answers)?;
-        Ok(Answers::new(answers.map(|inserted| inserted?.0)))
+        let name = map.clone();
+        let requests = scans.map(move |scan| pb::InsertScanRequest::from((&name, scan)));
+        let on = self.calls.connection_of_stream().await?;
+        let answers: Answers<Inserted> = on.answers(on.mapping().insert_scan_stream(requests).await)?;
+        Ok(self.calls.answers(map, Answers::new(answers.map(|inserted| inserted?.0))))
     }
 
     /// Queries batch after batch, with one answer for each: [`Client::query_points`] without a round trip between two
@@ -39,10 +39,11 @@ impl Client {
         map: &MapName,
         queries: impl Stream<Item = PointQuery> + Send + 'static,
     ) -> Result<Answers<PointAnswer>, ClientError> {
-        let map = map.clone();
-        let requests = queries.map(move |query| pb::QueryPointsRequest::from((&map, query)));
-        let answers = self.connection.occupancy().query_points_stream(requests).await;
-        self.connection.answers(answers)
+        let name = map.clone();
+        let requests = queries.map(move |query| pb::QueryPointsRequest::from((&name, query)));
+        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().query_points_stream(requests).await)?;
+        Ok(self.calls.answers(map, answers))
     }
 }
 

@@ -25,6 +25,32 @@ fn all_of_the_header_does_what_it_says_under_the_address_sanitizer() {
     assert_eq!(said(&program, &server, "all"), (true, "ok\n".to_owned()));
 }
 
+#[tokio::test]
+async fn a_client_of_several_servers_goes_on_at_the_next_when_one_is_killed() {
+    let (first, second) = (Server::start("cpp-first"), Server::start("cpp-second"));
+    for (server, scans) in [(&first, 1), (&second, 2)] {
+        let client = server.client().await;
+        make_map(&client).await;
+        for count in 1..=scans {
+            insert(&client, row(count)).await;
+        }
+    }
+    let mut driver = Driver::start("../../cpp/tests/several.cpp", Linked::Sanitized);
+    driver.does(&format!("open {},{}", first.grpc, second.grpc));
+    assert_eq!(driver.told("query a"), "1 10");
+    let (address, second) = (first.grpc.clone(), second);
+    drop(first);
+    // The map of that name is another one here.
+    assert_eq!(driver.told("query a"), "2 10");
+    assert_eq!(driver.told("insert a 1"), "3");
+    assert_eq!(driver.told("insert a 1"), "3");
+    driver.does("make b");
+    drop(second);
+    let gone = driver.told("query a");
+    assert!(gone.starts_with("MROL_UNREACHABLE: ") && gone.contains(&address), "{gone}");
+    driver.end();
+}
+
 #[test]
 fn points_that_are_no_floats_do_not_compile() {
     let folder = folder("cpp-points");

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal
@@ -15,6 +16,7 @@ from ._arguments import flag_of, word_of
 from ._arrays import number_of, seconds_of, vector_of, whole_of
 from ._fields import Fields, fields_of, reading
 from ._files import File
+from ._revisions import Revisions
 from ._sessions import Sessions
 from ._transport.address import Address
 from ._transport.caller import Bounds, Caller
@@ -23,6 +25,7 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.protocol import right_address
 from ._transport.request import JSON, Request, path_of, target_of
+from ._transport.servers import Servers
 from ._transport.stop import OpenStreams
 from ._transport.tls import tls_context
 from .errors import (
@@ -76,7 +79,9 @@ class Health:
 
 
 class Client:
-    """A server: `mrol.connect` makes one. Threads may share it, and so may processes that fork.
+    """A server, or several that serve the same maps: `mrol.connect` makes one.
+
+    Threads may share it, and so may processes that fork.
 
     Used as a context manager, or closed by `close`, it ends its watches and closes the connections that it keeps; it opens others
     if it is used again.
@@ -85,10 +90,11 @@ class Client:
     def __init__(self, caller: Caller) -> None:
         self._caller = caller
         self._sessions = Sessions()
+        self._revisions = Revisions()
 
     @property
     def address(self) -> str:
-        """The server's address."""
+        """The server's address; of several, that of the one in use."""
         return self._caller.address
 
     @property
@@ -120,7 +126,7 @@ class Client:
         Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: it is there with other settings), `InvalidArgument`
         (`bad_settings`, `bad_name`), `PermissionDenied` (`scope_too_small`: it is not there, and the key may not make it).
         """
-        found = Map(self._caller, name, robot, self._sessions)
+        found = Map(self._caller, name, robot, self._sessions, self._revisions)
         if resolution is None:
             if any(of is not None for of in (levels, filter, moments, origin)):
                 raise ArgumentError("resolution", "None with other settings", "given where a map is to be made")
@@ -161,7 +167,7 @@ class Client:
 
         Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: a map has that name), `InvalidArgument` (`bad_name`).
         """
-        renamed = Map(self._caller, word_of(to, "to"), robot, self._sessions)
+        renamed = Map(self._caller, word_of(to, "to"), robot, self._sessions, self._revisions)
         target = path_of("v1", "maps", word_of(name, "name"), "rename")
         self._caller.call(Request("POST", target, JSON, [json.dumps({"to": to}).encode()], is_repeatable=False))
         return renamed
@@ -191,7 +197,7 @@ class Client:
         A map of that name is kept as NAME-replaced-REVISION with `replace`; without, there must be none. `robot` is the name in
         which scans are sent, as of `map`. `progress` and `timeout_s` are as of `Map.restore`, and so are the errors.
         """
-        made = Map(self._caller, name, robot, self._sessions)
+        made = Map(self._caller, name, robot, self._sessions, self._revisions)
         target = target_of(path_of("v1", "maps", name, "snapshot"), {"replace": flag_of(replace, "replace")})
         restore(self._caller, target, source, progress, timeout_s)
         return made
@@ -219,6 +225,7 @@ class Client:
         """
         client = Client(self._caller.with_timeout(timeout_s, OpenStreams(self._caller.streams)))
         client._sessions = self._sessions
+        client._revisions = self._revisions
         return client
 
     def close(self) -> None:
@@ -239,7 +246,7 @@ class Client:
 
 
 def connect(
-    address: str = "localhost:7333",
+    address: str | Sequence[str] = "localhost:7333",
     *,
     key: str | None = None,
     key_file: File | None = None,
@@ -253,6 +260,12 @@ def connect(
     answer_bytes_max: int = ANSWER_BYTES_MAX,
 ) -> Client:
     """Connects to a server's HTTP: `address` is `host:port`, `https://host:port`, or `unix:/path` of a socket.
+
+    A list of addresses, or a text in which commas separate them, is that of servers of the same maps. The first that answers is
+    used until it is gone, then the next. A question is asked again there, and a change is sent again; `delete_map`, `rename_map`
+    and `restore`, which have no ids, only if they were not sent before. A server may send a request on to another (HTTP 307): it
+    is followed to these addresses alone, so that the key goes nowhere else. Questions wait for the last revision that any of the
+    servers told (`min_revision`), so that the map never goes back; listings, blocks, trajectories and descriptions do not.
 
     `key` is a secret, `key_file` a file with one, which is read again when the server refuses it: so a key may be rotated under a
     running program. Without either the variables MROL_KEY and MROL_KEY_FILE count, if they are set. `ca` (or MROL_CA) is a file of
@@ -276,23 +289,24 @@ def connect(
         key, key_file = _from_environment()
     own_ca = ca
     ca = os.environ.get("MROL_CA") or None if ca is None else ca
-    place = Address.parse(address, prefer_tls=ca is not None or client_cert is not None)
+    places = Address.parse_all(address, prefer_tls=ca is not None or client_cert is not None)
     bounds = Bounds(
         timeout_s=seconds(timeout_s, "timeout_s"),
         patience_s=seconds_of(patience_s, "patience_s"),
         request_bytes_max=whole_of(request_bytes_max, "request_bytes_max"),
         answer_bytes_max=whole_of(answer_bytes_max, "answer_bytes_max"),
     )
-    if not place.is_tls:
+    in_clear = next((place for place in places if not place.is_tls), None)
+    if in_clear is not None:
         for name, file in (("ca", own_ca), ("client_cert", client_cert), ("client_key", client_key)):
             if file is not None:
                 # A key would travel in the clear although its owner thinks that it does not.
-                raise ArgumentError(name, f"a file for {place.shown}", "given with an https:// address alone")
-    tls = tls_context(ca, client_cert, client_key) if place.is_tls else None
-    pool, secret = Pool(place, tls), Key(key, key_file)
-    impatient = Caller(pool, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))
+                raise ArgumentError(name, f"a file for {in_clear.shown}", "given with an https:// address alone")
+    tls = tls_context(ca, client_cert, client_key) if any(place.is_tls for place in places) else None
+    servers, secret = Servers([Pool(place, tls if place.is_tls else None) for place in places]), Key(key, key_file)
+    impatient = Caller(servers, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))
     _wait_for(impatient, seconds_of(wait_s, "wait_s"))
-    return Client(Caller(pool, secret, bounds))
+    return Client(Caller(servers, secret, bounds))
 
 
 def _from_environment() -> tuple[str | None, str | None]:

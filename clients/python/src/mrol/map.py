@@ -45,11 +45,11 @@ class Map(
 
     def with_timeout(self, timeout_s: float) -> "Map":
         """The same map, of which each call may take `timeout_s`, tries and waits included."""
-        return Map(self._caller.with_timeout(timeout_s), self._name, self._robot, self._sessions)
+        return Map(self._caller.with_timeout(timeout_s), self._name, self._robot, self._sessions, self._revisions)
 
     def with_robot(self, robot: str) -> "Map":
         """The same map, to which scans are sent in the name of another `robot`."""
-        return Map(self._caller, self._name, robot, self._sessions)
+        return Map(self._caller, self._name, robot, self._sessions, self._revisions)
 
     def __reduce__(self) -> "tuple[object, ...]":
         raise ArgumentError("the map", excerpt(self), "made anew in each process: a key is not to be written down with it")

@@ -56,6 +56,9 @@ impl Follower {
             builder.begin();
             builder.since()
         });
+        if let Some(since) = &since {
+            self.client.wait_to_go_on(&self.map, since).await;
+        }
         let request = WatchRequest {
             since,
             region: self.options.region,

@@ -1,6 +1,7 @@
 """Where a server is."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
@@ -14,6 +15,10 @@ _HOST = re.compile(r"[\w.-]+|[\da-f:.]+(%[\w.-]+)?")
 """A name, or a number of IPv6, which may have a zone."""
 
 EXPECTED = "host:port, http://host:port, https://host:port or unix:/path"
+
+_SEPARATOR = re.compile(r"\s*,\s*")
+_BEHIND_PATH = re.compile(r"\s*,\s*(?=https?://|unix:)")
+"""What separates the path of a socket, which may have commas, from the next address."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,14 @@ class Address:
             raise ArgumentError("address", _kind_of(text), EXPECTED)
         return found
 
+    @classmethod
+    def parse_all(cls, given: "str | Sequence[str]", prefer_tls: bool = False) -> "tuple[Address, ...]":
+        """The addresses of a list, or of a text in which commas separate them; each counts once."""
+        texts = texts_of(given) if isinstance(given, str) else given
+        if not isinstance(texts, list | tuple) or not texts:
+            raise ArgumentError("address", _kind_of(given), f"{EXPECTED}, or a list of them")
+        return tuple(dict.fromkeys(cls.parse(text, prefer_tls) for text in texts))
+
     @property
     def authority(self) -> str:
         """The value of the header `host`."""
@@ -51,6 +64,21 @@ class Address:
         if self.socket_path is not None:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
+
+
+def texts_of(given: str) -> list[str]:
+    """The addresses in a text, which commas separate; a path of a socket may have commas, too."""
+    return list(_texts(given))
+
+
+def _texts(given: str) -> Iterator[str]:
+    rest: str | None = given
+    while rest is not None:
+        separator = _BEHIND_PATH if rest.lstrip().startswith("unix:") else _SEPARATOR
+        parts = separator.split(rest, 1)
+        # One address alone is as it is, spaces and all.
+        yield given if parts[0] == given else parts[0].strip()
+        rest = parts[1] if len(parts) > 1 else None
 
 
 def _kind_of(address: object) -> str:

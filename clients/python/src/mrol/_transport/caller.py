@@ -1,10 +1,11 @@
-"""Requests to one server: each with a key, a connection, a deadline and, where it is safe, another try."""
+"""Requests to a server: each with a key, a connection, a deadline and, where it is safe, another try."""
 
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, excerpt, server_error
 from .address import Address
@@ -13,9 +14,14 @@ from .connection import Connection
 from .deadline import Deadline, seconds
 from .key import Key, Secret
 from .pool import Pool
+from .redirect import STATUS as SENT_ON
+from .redirect import target
 from .request import Answer, Request
 from .response import Response
+from .servers import Servers
 from .stop import OpenStreams, Stop
+
+Of = TypeVar("Of")
 
 ERROR_BYTES_MAX = 1 << 20
 """Bytes of an answer that says what is wrong, of one that is read piece by piece otherwise."""
@@ -32,10 +38,10 @@ class Bounds:
 
 
 class Caller:
-    """Asks one server; threads and forked processes may share it."""
+    """Asks one server, or one of several until it is gone; threads and forked processes may share it."""
 
-    def __init__(self, pool: Pool, key: Key, bounds: Bounds, streams: OpenStreams | None = None) -> None:
-        self._pool = pool
+    def __init__(self, servers: Servers, key: Key, bounds: Bounds, streams: OpenStreams | None = None) -> None:
+        self._servers = servers
         self._key = key
         self.bounds = bounds
         self.streams = OpenStreams() if streams is None else streams
@@ -44,22 +50,27 @@ class Caller:
     def with_timeout(self, timeout_s: float, streams: OpenStreams | None = None) -> "Caller":
         """The same caller, over the same connections and with the same streams or others, with another time for each call."""
         bounds = replace(self.bounds, timeout_s=seconds(timeout_s, "timeout_s"))
-        return Caller(self._pool, self._key, bounds, self.streams if streams is None else streams)
+        return Caller(self._servers, self._key, bounds, self.streams if streams is None else streams)
 
     @property
     def address(self) -> str:
-        """The server's address."""
-        return str(self._pool.address)
+        """The address of the server in use."""
+        return str(self.place)
 
     @property
     def place(self) -> Address:
-        """Where the server is."""
-        return self._pool.address
+        """Where the server in use is."""
+        return self._servers.current.address
+
+    @property
+    def has_several(self) -> bool:
+        """Whether there are several servers."""
+        return len(self._servers) > 1
 
     def close(self) -> None:
         """Ends the streams, and closes the connections that are kept."""
         self.streams.close()
-        self._pool.close()
+        self._servers.close()
 
     def call(self, request: Request, deadline: Deadline | None = None) -> Answer:
         """The answer to a request, whole, within its own time or by a deadline.
@@ -67,25 +78,43 @@ class Caller:
         Raises `ServerError` for a refusal, and `TransportError` or `BadAnswer` where there is no answer.
         """
         deadline = deadline or Deadline(self.bounds.timeout_s)
-        attempts = Attempts(self.bounds.patience_s, deadline)
-        may_renew = True
+        attempts = Attempts(self.bounds.patience_s, deadline, len(self._servers))
+        may_renew, hops, pool = True, 0, self._servers.current
         while True:
             was_kept, secret = False, self._key.secret()
             try:
-                connection, was_kept = self._pool.take(deadline, may_be_kept=request.is_repeatable)
+                connection, was_kept = self._servers.take(pool, deadline, may_be_kept=request.is_repeatable)
                 try:
                     answer = connection.ask(request, secret, deadline, self.bounds.answer_bytes_max)
                 finally:
-                    self._pool.give_back(connection)
+                    pool.give_back(connection)
+                if answer.status == SENT_ON and self.has_several:
+                    pool, hops = target(answer, self._servers, hops), hops + 1
+                    continue
                 raise_for(answer)
             except Unauthenticated:
                 if not (may_renew and self._key.renew(secret)):
                     raise
                 may_renew = False
             except (ServerError, TransportError) as error:
-                attempts.pause_after(error, request, was_kept)
+                if attempts.may_renew(error, request, was_kept):
+                    continue
+                if attempts.is_over_here(error):
+                    self._servers.leave(pool)
+                if attempts.may_go_on(error, request):
+                    pool = self._servers.next(pool)
+                else:
+                    attempts.pause_after(error, request, was_kept)
+                    pool = self._servers.current
             else:
                 return answer
+
+    def whole(self, read: Callable[[], Of]) -> Of:
+        """What is read piece by piece to its end: anew at another of several servers, where the connection is lost."""
+        for _ in range(len(self._servers) - 1):
+            with suppress(ConnectionLost):
+                return read()
+        return read()
 
     @contextmanager
     def stream(self, request: Request, stop: Stop | None = None) -> Iterator["Body"]:
@@ -96,40 +125,63 @@ class Caller:
         Raises `ConnectionLost` where the server ends it for the sake of its secret, and there is another one now.
         """
         deadline = Deadline(self.bounds.timeout_s, stop)
-        may_renew = True
-        while True:
-            secret = self._key.secret()
-            try:
-                connection, response = self._begun(request, secret, deadline)
-            except Unauthenticated:
-                if not (may_renew and self._key.renew(secret)):
-                    raise
-                may_renew = False
-            else:
-                break
+        pool, connection, response, secret = self._beginning(request, deadline)
         try:
             yield Body(connection, response)
         except Unauthenticated as refused:
             if not self._key.renew(secret):
                 raise
             raise ConnectionLost("the key was refused, and there is another one now") from refused
+        except TransportError:
+            if stop is None or not stop.is_set:
+                self._servers.leave(pool)
+            raise
         finally:
             connection.close()
-            self._pool.give_back(connection)
+            pool.give_back(connection)
 
-    def _begun(self, request: Request, secret: Secret, deadline: Deadline) -> tuple[Connection, Response]:
-        """An answer up to its body, over a connection of its own."""
-        connection, _ = self._pool.take(deadline)
+    def _beginning(self, request: Request, deadline: Deadline) -> tuple[Pool, Connection, Response, Secret]:
+        """An answer up to its body, of the first server that gives one; and the secret that it was asked with."""
+        attempts = Attempts(0.0, deadline, len(self._servers))
+        may_renew, hops, pool = True, 0, self._servers.current
+        while True:
+            secret = self._key.secret()
+            try:
+                connection, begun = self._begun(pool, request, secret, deadline)
+                if isinstance(begun, Answer):
+                    pool, hops = target(begun, self._servers, hops), hops + 1
+                    continue
+            except Unauthenticated:
+                if not (may_renew and self._key.renew(secret)):
+                    raise
+                may_renew = False
+            except (ServerError, TransportError) as error:
+                if attempts.is_over_here(error):
+                    self._servers.leave(pool)
+                if not attempts.may_go_on(error, request):
+                    raise attempts.of_all(error) from error.__cause__
+                pool = self._servers.next(pool)
+            else:
+                return pool, connection, begun, secret
+
+    def _begun(self, pool: Pool, request: Request, secret: Secret, deadline: Deadline) -> tuple[Connection, "Response | Answer"]:
+        """An answer up to its body, over a connection of its own; or all of one that names another server, without it."""
+        connection, _ = self._servers.take(pool, deadline)
         try:
             response = connection.open(request, secret, deadline, None)
             if response.status >= 300:
                 with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
                 said = memoryview(connection.read(response, with_bound, deadline))
-                raise_for(Answer(response.status, response.plain_headers, said))
+                answer = Answer(response.status, response.plain_headers, said)
+                if answer.status != SENT_ON or not self.has_several:
+                    raise_for(answer)
+                connection.close()
+                pool.give_back(connection)
+                return connection, answer
             _check_has_end(response)
         except BaseException:
             connection.close()
-            self._pool.give_back(connection)
+            pool.give_back(connection)
             raise
         return connection, response
 

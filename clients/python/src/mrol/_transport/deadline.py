@@ -43,6 +43,12 @@ class Deadline:
             raise self.passed()
         return left
 
+    def within(self, timeout_s: float) -> "Deadline":
+        """The moment after so many seconds, or this one if it is earlier; the same stop ends it."""
+        earlier = Deadline(timeout_s, self._stop)
+        earlier._end = min(earlier._end, self._end)
+        return earlier
+
     def guard(self, sock: socket.socket) -> None:
         """Sets the time of what waits on a socket, and lets the stop end it.
 

@@ -70,7 +70,8 @@ class BlockOperations(MapHandle):
         with reading("the block"):
             resolution_m = float(answer.header("mrol-resolution-m") or "")
             blocks = blocks_of(answer.body)
-            return VoxelBlocks(Version.of_headers(answer), whole_header(answer, "mrol-level"), resolution_m, blocks)
+            found = VoxelBlocks(Version.of_headers(answer), whole_header(answer, "mrol-level"), resolution_m, blocks)
+        return self._noted(found)
 
     def distances(self, box: BoxLike, *, level: int = 0, cap_m: float | None = None) -> DistanceField:
         """The distance field of a box along the map's axes: a byte a cell.
@@ -94,7 +95,7 @@ class BlockOperations(MapHandle):
             x, y, z = _three(answer, "mrol-origin")
             shape = _three(answer, "mrol-size")[::-1]
             quarters = np.frombuffer(answer.body, np.uint8).reshape(shape)
-            return DistanceField(
+            field = DistanceField(
                 version=Version.of_headers(answer),
                 level=whole_header(answer, "mrol-level"),
                 resolution_m=resolution_m,
@@ -102,6 +103,7 @@ class BlockOperations(MapHandle):
                 quarters=quarters,
                 cap=whole_header(answer, "mrol-cap"),
             )
+        return self._noted(field)
 
     def _block(self, parameters: dict[str, Parameter]) -> Answer:
         return self._caller.call(Request("GET", self._target("block", **parameters), accept=BYTES))

@@ -69,9 +69,9 @@ class DeletionOperations(MapHandle):
             common["not_seen_since"] = whole_of(not_seen_since, "not_seen_since")
         try:
             if points is not None:
-                return _deletion(self._delete_points(points, common))
+                return self._noted(_deletion(self._delete_points(points, common)))
             target = {"voxels": _indices(voxels)} if voxels is not None else _region(given[0], of_region[given[0]])
-            return _deletion(self._send_json("POST", ("deletions",), {**target, **common}))
+            return self._noted(_deletion(self._send_json("POST", ("deletions",), {**target, **common})))
         except MrolError as error:
             if is_outcome_unknown(error):
                 error.repeat_with = identity

@@ -106,7 +106,7 @@ class DescriptionOperations(MapHandle):
 
         Raises `NotFound` (`map_not_found`).
         """
-        return map_info(self._get_fields())
+        return self._noted(map_info(self._get_fields()))
 
 
 def map_info(fields: Fields) -> MapInfo:

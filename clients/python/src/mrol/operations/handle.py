@@ -2,26 +2,32 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from .._arguments import word_of
 from .._fields import Fields, fields_of
+from .._revisions import Revisions
 from .._sessions import Sessions
 from .._transport.caller import Caller
 from .._transport.request import BYTES, JSON, Answer, Parameter, Request, path_of, target_of
 from ..questions.all import Questions
+from ..version import Versioned
 from .backend import ServerBackend
+
+Of = TypeVar("Of", bound=Versioned)
 
 
 class MapHandle(Questions):
     """What all operations on a map use, and the questions, which the server answers."""
 
-    def __init__(self, caller: Caller, name: str, robot: str, sessions: Sessions) -> None:
+    def __init__(self, caller: Caller, name: str, robot: str, sessions: Sessions, revisions: Revisions | None = None) -> None:
         self._caller = caller
         self._name = word_of(name, "name")
         self._robot = word_of(robot, "robot")
         self._sessions = sessions
-        self._backend = ServerBackend(caller, self._name)
+        self._revisions = Revisions() if revisions is None else revisions
+        self._server = ServerBackend(caller, self._name, self._revisions)
+        self._backend = self._server
 
     @property
     def name(self) -> str:
@@ -36,6 +42,11 @@ class MapHandle(Questions):
     @property
     def _request_bytes_max(self) -> int:
         return self._caller.bounds.request_bytes_max
+
+    def _noted(self, answer: Of) -> Of:
+        """An answer, whose version is noted where there are several servers."""
+        self._server.note(answer.version)
+        return answer
 
     def _target(self, *segments: str, **parameters: Parameter) -> str:
         return target_of(path_of("v1", "maps", self._name, *segments), parameters)

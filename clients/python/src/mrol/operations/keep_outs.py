@@ -83,7 +83,7 @@ class KeepOutOperations(MapHandle):
             if is_outcome_unknown(error):
                 error.repeat_with = identity
             raise
-        return KeepOutChange(Version.of(fields), fields.flag("replayed"))
+        return self._noted(KeepOutChange(Version.of(fields), fields.flag("replayed")))
 
     def remove_keep_out(self, name: str, *, request_id: str | None = None) -> KeepOutChange:
         """Removes the keep-out of a `name`; `request_id` is as of `keep_out`.
@@ -98,12 +98,12 @@ class KeepOutOperations(MapHandle):
             if is_outcome_unknown(error):
                 error.repeat_with = identity
             raise
-        return KeepOutChange(Version.of(fields), fields.flag("replayed"))
+        return self._noted(KeepOutChange(Version.of(fields), fields.flag("replayed")))
 
     def keep_outs(self) -> KeepOuts:
         """All keep-outs of the map."""
         fields = self._get_fields("keep-outs")
-        return KeepOuts(Version.of(fields), tuple(_keep_out(of) for of in fields.objects("keep_outs")))
+        return self._noted(KeepOuts(Version.of(fields), tuple(_keep_out(of) for of in fields.objects("keep_outs"))))
 
 
 def _keep_out(fields: Fields) -> KeepOut:

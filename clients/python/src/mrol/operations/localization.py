@@ -94,7 +94,7 @@ class LocalizationOperations(MapHandle):
             "seed": whole_of(seed, "seed"),
         }
         fields = fields_of(self._send_bytes("localize", [raw(rows)], parameters).body)
-        return Localization(
+        found = Localization(
             version=Version.of(fields),
             accepted=fields.flag("accepted"),
             verdict=fields.text("verdict"),
@@ -106,6 +106,7 @@ class LocalizationOperations(MapHandle):
             search_ms=fields.number("search_ms"),
             points_skipped=fields.whole("points_skipped"),
         )
+        return self._noted(found)
 
 
 def _direction(vector: ArrayLike, argument: str) -> str:

@@ -44,7 +44,8 @@ class MapFileOperations(MapHandle):
         path = path_of_file(f"{self._name}.mrol" if file is None else file, "file")
         checked, file_s = checked_progress(progress), seconds(timeout_s, "timeout_s")
         with replacing(path, "file") as written:
-            return self._write(written, checked, file_s)
+            deadline = Deadline(file_s)
+            return self._caller.whole(lambda: self._write(written, checked, deadline))
 
     def restore(
         self, source: File | bytes, *, replace: bool = True, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S
@@ -60,11 +61,13 @@ class MapFileOperations(MapHandle):
         """
         return restore(self._caller, self._target("snapshot", replace=flag_of(replace, "replace")), source, progress, timeout_s)
 
-    def _write(self, written: IO[bytes], progress: Progress, timeout_s: float) -> Version:
-        caller = self._caller.with_timeout(min(timeout_s, self._caller.bounds.timeout_s))
+    def _write(self, written: IO[bytes], progress: Progress, deadline: Deadline) -> Version:
+        caller = self._caller.with_timeout(min(deadline.remaining_s(), self._caller.bounds.timeout_s))
+        written.seek(0)
+        written.truncate()
         request = Request("GET", self._target("snapshot"))
         with caller.stream(request) as body, progress_of(progress, self._name, body.length) as told:
-            _copy(body, written, told, timeout_s)
+            _copy(body, written, told, deadline)
             return Version.of_headers(body.answer)
 
 
@@ -79,8 +82,7 @@ def restore(caller: Caller, target: str, source: File | bytes, progress: Progres
     return map_info(fields_of(answer.body))
 
 
-def _copy(body: Body, written: IO[bytes], told: Told, timeout_s: float) -> None:
-    deadline = Deadline(timeout_s)
+def _copy(body: Body, written: IO[bytes], told: Told, deadline: Deadline) -> None:
     total, done = body.length, 0
     while piece := body.read(PIECE_BYTES, deadline):
         written.write(piece)

@@ -58,7 +58,7 @@ class ObserverOperations(MapHandle):
         with reading("voxel"):
             i, j, k = (int(of) for of in fields.numbers("voxel", (3,)))
         scans = tuple(_scan(of) for of in fields.objects("scans"))
-        return Observers(Version.of(fields), (i, j, k), scans, fields.flag("older_scans"))
+        return self._noted(Observers(Version.of(fields), (i, j, k), scans, fields.flag("older_scans")))
 
 
 def _index(voxel: ArrayLike) -> list[float]:

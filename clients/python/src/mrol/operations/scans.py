@@ -195,7 +195,7 @@ class ScanOperations(MapHandle):
             if is_outcome_unknown(error):
                 error.repeat_with = {"session": of_session, "scan_id": number}
             raise
-        return _scan_answer(answer, shape, of_robot, of_session, number)
+        return self._noted(_scan_answer(answer, shape, of_robot, of_session, number))
 
     @documents(SCAN_OPTIONS)
     def align(
@@ -233,7 +233,7 @@ class ScanOperations(MapHandle):
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         answer = self._send_bytes("alignment", pieces, parameters)
-        return _scan_answer(answer, shape, of_robot, "", None)
+        return self._noted(_scan_answer(answer, shape, of_robot, "", None))
 
     def _identity(self, robot: str, session: str | None, scan_id: int | None) -> tuple[str, int]:
         """The session and the id of a scan: those given, or the next of this process."""

@@ -67,7 +67,7 @@ class TrajectoryOperations(MapHandle):
             limit=None if limit is None else whole_of(limit, "limit"),
         )
         scans = tuple(_scan(of) for of in fields.objects("poses"))
-        return Trajectory(Version.of(fields), scans, fields.optional("next_since_revision", fields.whole))
+        return self._noted(Trajectory(Version.of(fields), scans, fields.optional("next_since_revision", fields.whole)))
 
 
 def _scan(fields: Fields) -> MappedScan:

@@ -68,7 +68,7 @@ class UndoOperations(MapHandle):
             if is_outcome_unknown(error):
                 error.repeat_with = identity
             raise
-        return Undo(
+        done = Undo(
             Version.of(fields),
             fields.whole("scans"),
             fields.whole("deletions"),
@@ -76,6 +76,7 @@ class UndoOperations(MapHandle):
             fields.whole("restored"),
             fields.flag("replayed"),
         )
+        return self._noted(done)
 
 
 def _target_of(change: object) -> dict[str, Any]:

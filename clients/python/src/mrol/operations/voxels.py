@@ -77,7 +77,8 @@ class VoxelOperations(MapHandle):
             head, indices = _read(answer.body)
             if head.whole("voxels_total") != len(indices):
                 raise ValueError(f"{len(indices)} voxels of {head.whole('voxels_total')}")
-            return Voxels(Version.of(head), indices, head.whole("level"), head.number("resolution_m"))
+            found = Voxels(Version.of(head), indices, head.whole("level"), head.number("resolution_m"))
+        return self._noted(found)
 
     def count_voxels(
         self,

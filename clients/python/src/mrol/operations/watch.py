@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
+
+import numpy as np
 
 from .._arguments import flag_of, level_of, word_of
 from .._arrays import whole_of
@@ -14,7 +16,7 @@ from .._transport.caller import Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
 from .._transport.stop import Stop
-from ..errors import ArgumentError, excerpt
+from ..errors import ArgumentError, MrolError, excerpt
 from ..progress import Progress, Told, checked_progress, progress_of
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
@@ -87,6 +89,8 @@ class WatchOperations(MapHandle):
         stop: Stop,
     ) -> Generator[WatchEvent, None, None]:
         def connect() -> Generator[WatchEvent, None, None]:
+            if version is not None and self._caller.has_several:
+                self._wait_to_go_on(version, stop)
             request = Request("GET", self._target("watch", **parameters, **_since(version)))
             return _told(self._caller, request, silent_s, told, stop)
 
@@ -99,6 +103,17 @@ class WatchOperations(MapHandle):
                     version = event.version
                 if heartbeats or not isinstance(event, Heartbeat):
                     yield event
+
+    def _wait_to_go_on(self, version: Version, stop: Stop) -> None:
+        """Waits for one of several servers that has the version from which a watch goes on.
+
+        One that is behind would tell of an older state. Where none has it the watch begins all the same, as after an older data
+        folder was put back.
+        """
+        asked = {"min_revision": version.revision, "map_uuid": version.map_uuid}
+        deadline = Deadline(self._caller.bounds.timeout_s, stop)
+        with suppress(MrolError):
+            self._server.query(np.zeros((1, 3), np.float32), (None, "exact", False), asked, deadline)
 
 
 def _is_at(one: Version, other: Version) -> bool:

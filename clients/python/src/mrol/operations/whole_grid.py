@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,11 +67,18 @@ class WholeGridOperations(MapHandle):
         more than `answer_bytes_max`.
         """
         fields = fields_of_grid(area, min_z_m, max_z_m, band_from, cell_m, tell_unknown=tell_unknown)
-        request = Request(
-            "POST", self._target("grid", "tiles"), BYTES, body_of_question({**fields, **QUESTION.checked(scope, "whole_grid")})
+        checked, options = checked_progress(progress), QUESTION.checked(scope, "whole_grid")
+        return self._server.in_order(
+            lambda scope, _: self._caller.whole(lambda: self._joined({**fields, **scope}, checked)),
+            lambda grid: grid.version,
+            options,
+            None,
         )
+
+    def _joined(self, fields: Mapping[str, Any], progress: Progress) -> WholeGrid:
+        request = Request("POST", self._target("grid", "tiles"), BYTES, body_of_question(fields))
         bounds, joined = self._caller.bounds, _Tiles(self._caller.bounds.answer_bytes_max)
-        with progress_of(checked_progress(progress), self._name, None) as told, self._caller.stream(request) as body:
+        with progress_of(progress, self._name, None) as told, self._caller.stream(request) as body:
             while not joined.are_all:
                 data = next_message(body, Deadline(bounds.timeout_s), bounds.answer_bytes_max)
                 with reading("a tile of the grid"):

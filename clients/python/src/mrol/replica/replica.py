@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
 from .._arguments import flag_of, text_of
 from .._arrays import whole_of
 from .._files import File, read_secret_file
-from .._transport.address import EXPECTED, Address
+from .._transport.address import EXPECTED, Address, texts_of
 from ..errors import ArgumentError
 from ..shapes import Box, BoxLike
 from ..version import Version
@@ -46,18 +47,19 @@ class Replica(InProcessMap):
 
     `address` is the server's gRPC address, `http://127.0.0.1:7334` or `unix:/run/mrol/grpc.sock`; `https://` with `ca`, the path of
     the PEM file of the authority, where it is not one that the system trusts. An address with a user, a path or a query is refused,
-    and not shown: `key` is the caller's secret. `region` copies the voxels of a box alone, and then questions are refused that what
-    lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each block of 8 x 8 x 8 voxels). With
-    `bloom` it has filters, without `viewpoints` it does not know what is free. Where the connection breaks it comes back by itself;
-    `status` tells. With `age_max_s`, more than the server's `watch_heartbeat_s`, questions raise `Unavailable` (`replica_stale`)
-    where the server was heard longer ago; without, answers may be of any age.
+    and not shown: `key` is the caller's secret. Several, in a list or with commas between them, are those of servers of the same
+    maps: the copy follows one of them until it is gone, then the next. `region` copies the voxels of a box alone, and then
+    questions are refused that what lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each
+    block of 8 x 8 x 8 voxels). With `bloom` it has filters, without `viewpoints` it does not know what is free. Where the
+    connection breaks it comes back by itself; `status` tells. With `age_max_s`, more than the server's `watch_heartbeat_s`,
+    questions raise `Unavailable` (`replica_stale`) where the server was heard longer ago; without, answers may be of any age.
 
     Raises `ConnectFailed`, `NotFound` (`map_not_found`), `Unauthenticated`, `PermissionDenied`, `TimedOut`.
     """
 
     def __init__(
         self,
-        address: str,
+        address: str | Sequence[str],
         map: str,
         *,
         key: str | None = None,
@@ -125,14 +127,15 @@ class Replica(InProcessMap):
 
 
 def _address_of(address: object) -> str:
-    """An address with its scheme: a host and a port, without a user, a path or a query.
+    """An address with its scheme, or several with commas between them: each a host and a port, without a user, a path or a query.
 
     What is none is not shown: it may have a key in it, or be one.
     """
-    if isinstance(address, str) and address.isprintable():
+    texts = texts_of(address) if isinstance(address, str) else address
+    if isinstance(texts, list | tuple) and texts and all(isinstance(text, str) and text.isprintable() for text in texts):
         with suppress(ArgumentError):
-            Address.parse(address)
-            return address if "://" in address or address.startswith("unix:") else f"http://{address}"
+            Address.parse_all(texts)
+            return ",".join(text if "://" in text or text.startswith("unix:") else f"http://{text}" for text in texts)
     raise ArgumentError("address", f"an object of {type(address).__name__} that is none (it is not shown)", EXPECTED)
 
 
