@@ -1,5 +1,5 @@
-//! How the worker of a map that several nodes share makes changes: those that it orders itself where this node leads, and
-//! those that the log has from the others.
+//! How the worker of a map that several nodes share makes changes: those that it orders itself where this node leads,
+//! and those that the log has from the others.
 
 use super::stop::{Stop, no_quorum, not_acknowledged, not_leader};
 use super::submission::{Refusal, SharedAct};
@@ -9,8 +9,8 @@ use crate::replication::{Base, LogError, Member, NodeName, NotOrdered, OrderedCh
 use mrol_map::map::Committed;
 use mrol_store::{ReceivedRecord, Record, StoredRecords, check_replayed, read_frames};
 
-/// How often a node begins to read before it says that the log does not hold together: where it stands, then at the base,
-/// and at the base again where that was moved meanwhile.
+/// How often a node begins to read before it says that the log does not hold together: where it stands, then at the
+/// base, and at the base again where that was moved meanwhile.
 const BEGINS_MAX: usize = 3;
 
 /// Compares what the log has with what this node made before.
@@ -191,8 +191,8 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes over: claims the lead where the log names another, gives the log what only this node has, and makes changes
-    /// from then on.
+    /// Takes over: claims the lead where the log names another, gives the log what only this node has, and makes
+    /// changes from then on.
     fn lead(&mut self, live: &[(NodeName, u64)]) -> Result<(), ServiceError> {
         self.catch_up()?;
         let revision = self.map.revision();

@@ -368,8 +368,8 @@ impl History {
     }
 
     /// An older copy of the log is put back, where one fault is enough to show what is looked for: all nodes are there,
-    /// one of them has made all that is lost, and no leader is there that has not heard of its successor (it could go on in
-    /// the older copy: then nodes say that their histories differ).
+    /// one of them has made all that is lost, and no leader is there that has not heard of its successor (it could go
+    /// on in the older copy: then nodes say that their histories differ).
     fn lose_newest(&mut self) {
         let mut log = self.log.lock();
         let members: Vec<&Member> =

@@ -53,8 +53,8 @@ pub(crate) enum SharedAct {
     Lead(Vec<(NodeName, u64)>),
     /// Gives the lead to another node.
     HandOver(NodeName),
-    /// Tells where another node can begin to read, with a copy of this node's map as it is now or later; none where that
-    /// would be in the middle of a change.
+    /// Tells where another node can begin to read, with a copy of this node's map as it is now or later; none where
+    /// that would be in the middle of a change.
     Base(oneshot::Sender<Option<Base>>),
 }
 

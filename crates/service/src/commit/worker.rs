@@ -200,7 +200,8 @@ impl Worker {
         for (k, Pending { change, answer, .. }) in ordered.enumerate() {
             let durations = Arc::clone(&self.durations);
             self.apply(change, |committed| {
-                // Counted before the last one hears of it, so that whoever was answered finds its commit in the metrics.
+                // Counted before the last one hears of it, so that whoever was answered finds its commit in the
+                // metrics.
                 if k == last {
                     durations.record(begin.elapsed());
                 }

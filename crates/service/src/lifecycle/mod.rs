@@ -1,5 +1,5 @@
-//! Operations on maps as a whole: they are made, described, listed, deleted and saved, as map files too, and shared with
-//! other nodes.
+//! Operations on maps as a whole: they are made, described, listed, deleted and saved, as map files too, and shared
+//! with other nodes.
 
 mod map_file;
 mod operations;

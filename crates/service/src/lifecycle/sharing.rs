@@ -46,8 +46,8 @@ impl MapService {
     /// anybody may change the map. It stays in memory, under its name, until the server ends.
     ///
     /// # Errors
-    /// `NotFound` without such a map, `NoJournal` for one that is kept in memory only, `NoQuorum` where the log does not
-    /// answer, and `HistoriesDiffer` where the log has another history of the map than this server's folder.
+    /// `NotFound` without such a map, `NoJournal` for one that is kept in memory only, `NoQuorum` where the log does
+    /// not answer, and `HistoriesDiffer` where the log has another history of the map than this server's folder.
     pub async fn share_map(
         &self,
         name: &MapName,
@@ -62,8 +62,8 @@ impl MapService {
         self.act_on(name, SharedAct::Join { log, node, map: map.uuid }).await
     }
 
-    /// Makes what the log of a shared map has; to be called whenever it may have more. Nothing is asked of the log where
-    /// the message of the number `newest` is the last that this node read.
+    /// Makes what the log of a shared map has; to be called whenever it may have more. Nothing is asked of the log
+    /// where the message of the number `newest` is the last that this node read.
     ///
     /// # Errors
     /// As for [`MapService::share_map`].
@@ -92,8 +92,8 @@ impl MapService {
         self.act_on(name, SharedAct::HandOver(node)).await
     }
 
-    /// Where the log of a shared map can begin for a node that starts with a copy of this node's map, taken now or later;
-    /// none where the newest change is not whole yet.
+    /// Where the log of a shared map can begin for a node that starts with a copy of this node's map, taken now or
+    /// later; none where the newest change is not whole yet.
     ///
     /// # Errors
     /// As for [`MapService::share_map`].

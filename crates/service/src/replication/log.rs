@@ -20,8 +20,8 @@ pub enum NotPublished {
 /// Why a log could not be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LogError {
-    /// The log does not have the message at that position any more, or has another there: an older copy was put back, or
-    /// what was there is only in the base now. Whoever reads begins at the base again.
+    /// The log does not have the message at that position any more, or has another there: an older copy was put back,
+    /// or what was there is only in the base now. Whoever reads begins at the base again.
     #[error("the log has no such position")]
     NoSuchPosition,
     /// The log does not answer.

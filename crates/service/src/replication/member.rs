@@ -102,9 +102,9 @@ impl Member {
         &self.reading.base
     }
 
-    /// Where others can begin to read, with a copy of this node's map at `revision`, of which all that a copy may hold has
-    /// the hash `state`, made by a record with the checksum; none where that would be in the middle of a change, or where
-    /// the log is not at this revision.
+    /// Where others can begin to read, with a copy of this node's map at `revision`, of which all that a copy may hold
+    /// has the hash `state`, made by a record with the checksum; none where that would be in the middle of a change, or
+    /// where the log is not at this revision.
     pub(crate) fn base_here(&self, revision: u64, state: StateHash, checksum: Option<u32>) -> Option<Base> {
         self.reading.base_here(state, checksum).filter(|base| base.revision == revision)
     }

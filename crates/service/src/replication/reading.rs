@@ -67,8 +67,8 @@ impl Reading {
         Self { position, epoch, leader, head: revision, base, pieces: None }
     }
 
-    /// Where others can begin to read, with a map that is at the head; none in the middle of a change, of which they would
-    /// not see the beginning.
+    /// Where others can begin to read, with a map that is at the head; none in the middle of a change, of which they
+    /// would not see the beginning.
     pub(super) fn base_here(&self, state: StateHash, checksum: Option<u32>) -> Option<Base> {
         self.pieces.is_none().then(|| Base {
             position: self.position,
