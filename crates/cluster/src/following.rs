@@ -29,7 +29,7 @@ impl Following {
                 let followed = service.follow_map(&map, heard).await;
                 let said = followed.err().map(|error| (error.reason, error.message));
                 match &said {
-                    Some((Reason::HistoriesDiffer | Reason::MapNotFound, _)) => return,
+                    Some((Reason::MapNotFound, _)) => return,
                     Some((_, why)) if said != last_said => {
                         tracing::warn!(%map, why, "does not follow its log")
                     }

@@ -46,8 +46,11 @@ impl Node {
         }
         let log = Arc::new(eventually(|| JetStreamLog::create(engine, uuid)));
         let node = NodeName::new(name).unwrap();
-        // Where the log does not answer yet, the node follows it once it does.
-        drop(runtime.block_on(service.share_map(&map(), log.clone(), node.clone())));
+        eventually(|| match runtime.block_on(service.share_map(&map(), log.clone(), node.clone())) {
+            // Where the log does not answer yet, the node follows it once it does.
+            Err(error) if error.reason != Reason::NoQuorum => Err(error),
+            _ => Ok(()),
+        });
         let following = Following::begin(service.clone(), map(), &log);
         Self { name: node, service, _following: following }
     }

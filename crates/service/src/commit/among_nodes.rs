@@ -1,17 +1,22 @@
 //! How the worker of a map that several nodes share makes changes: those that it orders itself where this node leads,
 //! and those that the log has from the others.
 
-use super::stop::{Stop, no_quorum, not_acknowledged, not_leader};
+use std::time::{Duration, Instant};
+
+use super::stop::{Stop, no_quorum, not_acknowledged, not_kept, not_leader, not_shared};
 use super::submission::{Refusal, SharedAct};
 use super::worker::Worker;
 use crate::error::ServiceError;
 use crate::replication::{Base, LogError, Member, NodeName, NotOrdered, OrderedChanges};
-use mrol_map::map::Committed;
+use mrol_map::map::{Change, Committed};
 use mrol_store::{ReceivedRecord, Record, StoredRecords, check_replayed, read_frames};
 
 /// How often a node begins to read before it says that the log does not hold together: where it stands, then at the
 /// base, and at the base again where that was moved meanwhile.
 const BEGINS_MAX: usize = 3;
+
+/// How long a turn makes what the log has before other changes and the sync have theirs.
+const TURN_MAX: Duration = Duration::from_millis(500);
 
 /// Compares what the log has with what this node made before.
 struct OwnHistory {
@@ -21,23 +26,21 @@ struct OwnHistory {
 }
 
 impl Worker {
-    /// Does what a node does about a map that several share.
-    pub(super) fn act(&mut self, act: SharedAct) -> Result<Committed, ServiceError> {
+    /// Does what a node does about a map that several share. `Stale` where there is more to follow than one turn takes.
+    pub(super) fn act(&mut self, act: SharedAct) -> Result<Committed, Refusal> {
         if let Some(stop) = self.stopped.get() {
-            return Err(stop.refusal(&self.name));
+            return Err(stop.refusal(&self.name).into());
         }
+        if let SharedAct::Join { log, node, map } = act {
+            // Whether or not the log answers: from now on no change passes it by.
+            self.member = Some(Member::join(log, node, map));
+            return self.follow();
+        }
+        let Some(member) = &self.member else { return Err(not_shared(&self.name).into()) };
         match act {
-            SharedAct::Join { log, node, map } => {
-                // Whether or not the log answers: from now on no change passes it by.
-                self.member = Some(Member::join(log, node, map));
-                self.catch_up()?;
-            }
-            SharedAct::Follow { newest } => {
-                let read = self.member.as_ref().map_or(0, |member| member.position().sequence);
-                if newest != Some(read) {
-                    self.catch_up()?;
-                }
-            }
+            SharedAct::Join { .. } => {}
+            SharedAct::Follow { newest } if newest == Some(member.position().sequence) => {}
+            SharedAct::Follow { .. } => return self.follow(),
             SharedAct::Lead(live) => self.lead(&live)?,
             SharedAct::HandOver(node) => self.hand_over(node)?,
             SharedAct::Base(told) => {
@@ -48,27 +51,55 @@ impl Worker {
         Ok(Committed::none(self.map.content_version()))
     }
 
+    /// Makes what the log has, as much as a turn takes: others wait for the next one.
+    fn follow(&mut self) -> Result<Committed, Refusal> {
+        let until = Instant::now() + TURN_MAX;
+        match self.catch_up_until(Some(until))? {
+            true => Ok(Committed::none(self.map.content_version())),
+            false => Err(Refusal::Stale),
+        }
+    }
+
+    /// Refuses changes where another node makes them, before any work is done for them.
+    pub(super) fn check_leads(&self) -> Result<(), Refusal> {
+        match &self.member {
+            Some(member) if !member.leads() => Err(not_leader(&self.name, member.other_leader()).into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// That there is nothing to change holds for the newest revision alone: a leader that was overtaken does not know it.
+    pub(super) fn confirm_unchanged(&mut self) -> Result<(), Refusal> {
+        if self.member.is_none() {
+            return Ok(());
+        }
+        let revision = self.map.revision();
+        self.settle_pending()?;
+        self.catch_up()?;
+        self.check_leads()?;
+        if self.map.revision() == revision { Ok(()) } else { Err(Refusal::Stale) }
+    }
+
     /// Puts the first of these records behind all that is in the log and in this node's folder; returns how many.
     pub(super) fn order_among_nodes(&mut self, records: &[&Record]) -> Result<usize, Refusal> {
+        self.settle_pending()?;
+        self.check_leads()?;
         let state_before = self.map.state_hash();
         let Some(member) = &mut self.member else { return Ok(0) };
-        if !member.leads() {
-            return Err(not_leader(&self.name, member.other_leader()).into());
-        }
         let records = &records[..member.fitting(records)];
         match member.order(records, Some(state_before)) {
             Ok(()) => {
                 member.note_agreed(member.head());
                 // In the log it is for good: where this folder fails now, the other nodes have it.
-                self.append(records)?;
+                let name = self.name.clone();
+                self.append(records).map_err(|error| not_kept(&name, &error))?;
                 Ok(records.len())
             }
             Err(NotOrdered::NotLeader) => Err(not_leader(&self.name, member.other_leader()).into()),
-            Err(NotOrdered::Unknown { reason, may_count: true }) => {
-                Err(not_acknowledged(&self.name, &reason).into())
-            }
-            Err(NotOrdered::Unknown { reason, may_count: false }) => {
-                Err(no_quorum(&self.name, &reason).into())
+            Err(NotOrdered::Unknown { reason, may_count }) => {
+                self.is_log_silent = true;
+                let unknown = if may_count { not_acknowledged } else { no_quorum };
+                Err(unknown(&self.name, &reason).into())
             }
             // The log has what this node did not know of when the change was decided.
             Err(NotOrdered::Overtaken) => {
@@ -78,39 +109,70 @@ impl Worker {
         }
     }
 
-    /// Makes what the log has behind what was read of it.
+    /// Finds out what became of what was published before, and makes it where it is in the log. `Stale` where the map went
+    /// on by it.
+    fn settle_pending(&mut self) -> Result<(), Refusal> {
+        if self.is_log_silent {
+            return Err(no_quorum(&self.name, "it did not answer just now").into());
+        }
+        let Some(member) = self.member.as_mut().filter(|member| member.has_pending()) else { return Ok(()) };
+        let revision = self.map.revision();
+        match member.settle() {
+            Ok(None) => return Ok(()),
+            Ok(Some(changes)) => self.make_ordered(&changes, &mut OwnHistory { records: None, next: 0 })?,
+            Err(NotOrdered::NotLeader | NotOrdered::Overtaken) => self.catch_up()?,
+            Err(NotOrdered::Unknown { reason, .. }) => {
+                self.is_log_silent = true;
+                return Err(no_quorum(&self.name, &reason).into());
+            }
+        }
+        if self.map.revision() == revision { Ok(()) } else { Err(Refusal::Stale) }
+    }
+
+    /// Makes all that the log has behind what was read of it.
     fn catch_up(&mut self) -> Result<(), ServiceError> {
+        self.catch_up_until(None).map(drop)
+    }
+
+    /// Makes what the log has, until that time; true where that is all.
+    fn catch_up_until(&mut self, until: Option<Instant>) -> Result<bool, ServiceError> {
         let mut own = OwnHistory { records: None, next: 0 };
         for _ in 0..BEGINS_MAX {
-            match self.read_on(&mut own) {
+            match self.read_on(&mut own, until) {
                 Err(Interrupted::ByLog(LogError::NoSuchPosition)) => {
                     own = OwnHistory { records: None, next: 0 };
                     let begun = self.member.as_mut().map_or(Ok(()), Member::begin_again);
                     begun.map_err(|error| no_quorum(&self.name, &error.to_string()))?;
+                    self.compare_base()?;
                 }
                 Err(Interrupted::ByLog(LogError::Unavailable(reason))) => {
                     return Err(no_quorum(&self.name, &reason));
                 }
                 Err(Interrupted::ByChange(error)) => return Err(error),
-                Ok(()) => return Ok(()),
+                Ok(is_all) => return Ok(is_all),
             }
         }
         Err(no_quorum(&self.name, "it does not hold together"))
     }
 
-    fn read_on(&mut self, own: &mut OwnHistory) -> Result<(), Interrupted> {
-        self.compare_base()?;
+    fn read_on(&mut self, own: &mut OwnHistory, until: Option<Instant>) -> Result<bool, Interrupted> {
         loop {
-            let Some(member) = &self.member else { return Ok(()) };
+            if let Some(stop) = self.stopped.get() {
+                return Err(Interrupted::ByChange(stop.refusal(&self.name)));
+            }
+            let Some(member) = &self.member else { return Ok(true) };
             let entries = member.fetch()?;
             if entries.is_empty() {
-                return Ok(());
+                return Ok(true);
             }
             for entry in entries {
                 let read = self.member.as_mut().map(|member| member.read(entry)).transpose()?;
                 if let Some(changes) = read.flatten() {
                     self.make_ordered(&changes, own)?;
                 }
+            }
+            if until.is_some_and(|until| Instant::now() >= until) {
+                return Ok(false);
             }
         }
     }
@@ -123,14 +185,11 @@ impl Worker {
             return Err(self.diverged(format!("it is at revision {own}, and the log begins at {revision}")));
         }
         let state = self.published.recent.hashes_at(revision).map(|hashes| hashes.state);
-        let is_same = match (state.zip(base.state), base.checksum) {
-            (Some((ours, theirs)), _) => Some(ours == theirs),
-            (None, Some(theirs)) => self.checksum_at(revision).map(|ours| ours == theirs),
-            (None, None) => None,
-        };
-        match (is_same, &mut self.member) {
-            (Some(false), _) => Err(self.differs_at(revision)),
-            (Some(true), Some(member)) if member.head() == revision => {
+        let by_state = state.zip(base.state).map(|(ours, theirs)| ours == theirs);
+        let by_record = self.checksum_at(revision).zip(base.checksum).map(|(ours, theirs)| ours == theirs);
+        match ([by_state, by_record], &mut self.member) {
+            ([Some(false), _] | [_, Some(false)], _) => Err(self.differs_at(revision)),
+            ([Some(true), _] | [_, Some(true)], Some(member)) => {
                 member.note_agreed(revision);
                 Ok(())
             }
@@ -141,12 +200,13 @@ impl Worker {
     /// Where another node can begin to read the log, with a copy of this map.
     pub(super) fn base_here(&self) -> Option<Base> {
         let revision = self.map.revision();
-        self.member.as_ref()?.base_here(revision, self.map.state_hash(), self.checksum_at(revision))
+        let member = self.member.as_ref().filter(|member| member.agrees())?;
+        member.base_here(revision, self.map.state_hash(), self.checksum_at(revision))
     }
 
     /// Checksum of this node's own record of a revision, where it is kept.
     fn checksum_at(&self, revision: u64) -> Option<u32> {
-        let (_, stored) = self.folder.as_ref()?.records_from(revision).next()?.ok()?;
+        let (_, stored) = self.own_records(revision)?.next()?.ok()?;
         Some(Record::from(stored).checksum())
     }
 
@@ -164,30 +224,39 @@ impl Worker {
             Err(reason) => return Err(self.diverged(format!("the log has a message that is none: {reason}"))),
         };
         let before = self.published.recent.hashes_at(changes.first - 1).map(|hashes| hashes.state);
-        if let (Some(ours), Some(theirs)) = (before, changes.state_before)
-            && ours != theirs
-        {
+        let by_state = before.zip(changes.state_before).map(|(ours, theirs)| ours == theirs);
+        let agreed_before = self.member.as_ref().is_some_and(|member| member.agrees_at(changes.first - 1));
+        if by_state == Some(false) {
             return Err(self.differs_at(changes.first - 1));
         }
-        let (known, new): (Vec<_>, Vec<_>) = received.into_iter().partition(|it| it.revision <= head);
-        let mut is_same = !new.is_empty();
-        for ReceivedRecord { revision, record, .. } in known {
+        let mut is_same = by_state == Some(true) || agreed_before;
+        for ReceivedRecord { revision, record, change } in received {
+            if revision > head {
+                if !is_same {
+                    return Err(self.cannot_tell(revision - 1));
+                }
+                self.make_received(revision, &record, change)?;
+                continue;
+            }
             match own.record_of(revision, self) {
                 Some(ours) if ours != record => return Err(self.differs_at(revision)),
-                ours => is_same |= ours.is_some() && revision == changes.last,
+                ours => is_same = ours.is_some(),
             }
-        }
-        self.append(&new.iter().map(|it| &it.record).collect::<Vec<_>>())?;
-        for ReceivedRecord { revision, change, .. } in new {
-            if let Err(reason) = check_replayed(&self.map, &change) {
-                return Err(self.diverged(format!("the log's revision {revision} cannot be made: {reason}")));
-            }
-            self.apply(change, |_| {});
         }
         if let Some(member) = self.member.as_mut().filter(|_| is_same) {
             member.note_agreed(changes.last);
         }
         self.note_durable();
+        Ok(())
+    }
+
+    /// Makes a change that another node ordered: what cannot be made does not come into the folder.
+    fn make_received(&mut self, revision: u64, record: &Record, change: Change) -> Result<(), ServiceError> {
+        if let Err(reason) = check_replayed(&self.map, &change) {
+            return Err(self.diverged(format!("the log's revision {revision} cannot be made: {reason}")));
+        }
+        self.append(&[record])?;
+        self.apply(change, |_| {});
         Ok(())
     }
 
@@ -200,14 +269,19 @@ impl Worker {
             let reason = format!("node {node} has revision {head}, this one {revision}");
             return Err(no_quorum(&self.name, &reason));
         }
-        let Some(member) = &mut self.member else { return Ok(()) };
-        if revision > member.head() && !member.agrees() {
-            let head = member.head();
+        let Some(member) = &self.member else { return Ok(()) };
+        let head = member.head();
+        if !member.agrees() {
+            return Err(self.cannot_tell(head));
+        }
+        if revision > head && self.checksum_at(head + 1).is_none() {
             let how = format!(
-                "it is at revision {revision}, and does not know any more whether the log's {head} is of its history"
+                "it is at revision {revision}, the log at {head}, and it no longer keeps what is between"
             );
             return Err(Stop::Diverged(how).refusal(&self.name));
         }
+        self.settle_pending().map_err(|refusal| self.not_settled(refusal))?;
+        let Some(member) = &mut self.member else { return Ok(()) };
         if !member.is_named() {
             let claimed = member.claim_for_itself();
             self.settled(claimed)?;
@@ -271,6 +345,27 @@ impl Worker {
         })
     }
 
+    fn not_settled(&self, refusal: Refusal) -> ServiceError {
+        match refusal {
+            Refusal::Failed(error) => error,
+            Refusal::Stale => not_leader(&self.name, self.member.as_ref().and_then(Member::other_leader)),
+        }
+    }
+
+    /// This node's own records from a revision on.
+    fn own_records(&self, revision: u64) -> Option<StoredRecords> {
+        Some(self.folder.as_ref()?.records_from(revision))
+    }
+
+    /// Nothing shows that the log's revision is of this node's history: it neither goes on nor takes over. Other nodes may.
+    fn cannot_tell(&self, revision: u64) -> ServiceError {
+        let own = self.map.revision();
+        let how = format!(
+            "it is at revision {own}, and does not know any more whether the log's {revision} is of its history"
+        );
+        Stop::Diverged(how).refusal(&self.name)
+    }
+
     fn differs_at(&self, revision: u64) -> ServiceError {
         let own = self.map.revision();
         self.diverged(format!(
@@ -278,7 +373,7 @@ impl Worker {
         ))
     }
 
-    /// From now on this node serves the map no more.
+    /// From now on this node makes no more changes of the map.
     fn diverged(&self, how: String) -> ServiceError {
         tracing::error!(map = %self.name, how, "this node has another history than the log");
         self.stopped.get_or_init(|| Stop::Diverged(how)).refusal(&self.name)
@@ -289,8 +384,7 @@ impl OwnHistory {
     /// The node's own record of a revision, where it is kept; the revisions that are asked for ascend.
     fn record_of(&mut self, revision: u64, worker: &Worker) -> Option<Record> {
         if self.records.is_none() || self.next != revision {
-            let folder = worker.folder.as_ref()?;
-            self.records = Some(folder.records_from(revision));
+            self.records = Some(worker.own_records(revision)?);
         }
         self.next = revision + 1;
         let (_, stored) = self.records.as_mut()?.next()?.ok()?;

@@ -37,7 +37,7 @@ impl Stop {
                 ServiceError::new(Reason::MapReadOnly, message)
             }
             Self::Diverged(how) => {
-                let message = format!("map {name} is not served by this node: {how}");
+                let message = format!("map {name} takes no changes on this node: {how}");
                 ServiceError::new(Reason::HistoriesDiffer, message)
             }
             Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
@@ -78,6 +78,20 @@ pub(super) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceEr
         None => format!("no node has taken over map {name} yet: try again"),
     };
     ServiceError::new(Reason::NotLeader, message).retry_after(LEADER_SOON)
+}
+
+/// What to say of a map that nobody shared yet, to a node that is told to do something about it.
+pub(super) fn not_shared(name: &MapName) -> ServiceError {
+    ServiceError::new(Reason::NotLeader, format!("map {name} has no log yet: share it first"))
+}
+
+/// What to say to whose change is in the log, where this node's folder fails then.
+pub(super) fn not_kept(name: &MapName, error: &ServiceError) -> ServiceError {
+    let message = format!(
+        "this change of map {name} is in its log, and this node could not keep it ({error}): other nodes make it; the same \
+         scan_id or request_id, sent to one of them, tells"
+    );
+    ServiceError::new(Reason::OutcomeUnknown, message)
 }
 
 /// What to say where the log of a map does not answer: nothing was changed.

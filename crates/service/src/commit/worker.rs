@@ -42,6 +42,8 @@ pub(super) struct Worker {
     pub(super) published: Published,
     /// Its part in the log that several nodes share; none of a map that is this server's alone.
     pub(super) member: Option<Member>,
+    /// The log did not answer in this turn: what else waits in it is refused at once.
+    pub(super) is_log_silent: bool,
     pub(super) stopped: Arc<OnceLock<Stop>>,
     durations: Arc<SharedDurations>,
     settings: StoreSettings,
@@ -74,14 +76,32 @@ impl Worker {
     ) -> Self {
         let thinned = map.revision();
         let settings = settings.clone();
-        let (member, unsynced) = (None, None);
-        Self { name, map, folder, published, member, stopped, durations, settings, unsynced, thinned }
+        Self {
+            name,
+            map,
+            folder,
+            published,
+            member: None,
+            is_log_silent: false,
+            stopped,
+            durations,
+            settings,
+            unsynced: None,
+            thinned,
+        }
     }
 
     /// Makes the changes that wait, in order; a run of known ones shares one sync.
     pub(super) fn commit(&mut self, waiting: Vec<Waiting>) {
         let mut group = Vec::new();
+        self.is_log_silent = false;
         for Waiting { submission, answer, .. } in waiting {
+            if let (Submission::Prepared(_) | Submission::Undecided(_), Err(refusal)) =
+                (&submission, self.check_leads())
+            {
+                drop(answer.send(Err(refusal)));
+                continue;
+            }
             match submission {
                 Submission::Prepared(prepared) => {
                     let Prepared { mut change, mut record, if_empty, limits, robot_lock, reservation } =
@@ -107,7 +127,7 @@ impl Worker {
                 }
                 Submission::Shared(act) => {
                     self.commit_group(&mut group);
-                    drop(answer.send(self.act(act).map_err(Refusal::Failed)));
+                    drop(answer.send(self.act(act)));
                 }
             }
         }
@@ -131,7 +151,7 @@ impl Worker {
         Ok(())
     }
 
-    fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
+    fn decide(&mut self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
         let unchanged = Committed::none(self.map.content_version());
         let caller_gone = || answer.is_closed();
         let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
@@ -148,7 +168,7 @@ impl Worker {
             Ok(Some((change, record, _memory, _pin))) => {
                 group.push(Pending { change, record, answer, _robot_lock: None, _memory, _pin });
             }
-            Ok(None) => drop(answer.send(Ok(unchanged))),
+            Ok(None) => drop(answer.send(self.confirm_unchanged().map(|()| unchanged))),
             Err(refusal) => drop(answer.send(Err(refusal))),
         }
     }

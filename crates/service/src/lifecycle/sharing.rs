@@ -10,11 +10,11 @@ use super::map_file::from_file;
 use crate::commit::{Refusal, SharedAct, Submission};
 use crate::error::{Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
-use crate::maps::BuiltMap;
+use crate::maps::{BuiltMap, HostedMap};
 use crate::replication::{Base, NodeName, ReplicatedLog};
 use crate::request::MapVersion;
 use crate::work::Requester;
-use mrol_map::map::MapName;
+use mrol_map::map::{Committed, MapName};
 use mrol_map::util::StopSignal;
 
 impl MapService {
@@ -58,8 +58,13 @@ impl MapService {
         if map.folder.is_none() {
             return Err(map.no_journal("a map that nodes share"));
         }
+        let join = SharedAct::Join { log, node, map: map.uuid };
+        let joined = map.commit_queue.submit(&Requester::from(&self.asker), Submission::Shared(join))?;
         map.note_shared();
-        self.act_on(name, SharedAct::Join { log, node, map: map.uuid }).await
+        match self.outcome_of_act(&map, joined).await? {
+            Some(version) => Ok(version),
+            None => self.follow_map(name, None).await,
+        }
     }
 
     /// Makes what the log of a shared map has; to be called whenever it may have more. Nothing is asked of the log
@@ -68,11 +73,16 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::share_map`].
     pub async fn follow_map(&self, name: &MapName, newest: Option<u64>) -> Result<MapVersion, ServiceError> {
-        self.act_on(name, SharedAct::Follow { newest }).await
+        loop {
+            if let Some(version) = self.act_on(name, SharedAct::Follow { newest }).await? {
+                return Ok(version);
+            }
+        }
     }
 
     /// Takes the lead of a shared map over, and gives its log what only this node has. `live` are the other nodes that
-    /// are up, with the revisions that they are at: a node that is behind one of them does not take over.
+    /// are up and have not parted from the log, with the revisions that they are at: a node that is behind one of them does
+    /// not take over.
     ///
     /// # Errors
     /// As for [`MapService::share_map`]; `NotLeader` where another node was faster, `NoQuorum` where one is ahead.
@@ -81,7 +91,7 @@ impl MapService {
         name: &MapName,
         live: Vec<(NodeName, u64)>,
     ) -> Result<MapVersion, ServiceError> {
-        self.act_on(name, SharedAct::Lead(live)).await
+        self.act_on(name, SharedAct::Lead(live)).await?.ok_or_else(went_on)
     }
 
     /// Gives the lead of a shared map to another node.
@@ -89,7 +99,7 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::share_map`]; `NotLeader` where this node does not lead.
     pub async fn hand_map_over(&self, name: &MapName, node: NodeName) -> Result<MapVersion, ServiceError> {
-        self.act_on(name, SharedAct::HandOver(node)).await
+        self.act_on(name, SharedAct::HandOver(node)).await?.ok_or_else(went_on)
     }
 
     /// Where the log of a shared map can begin for a node that starts with a copy of this node's map, taken now or
@@ -103,15 +113,26 @@ impl MapService {
         told.await.map_err(commit_thread_ended)
     }
 
-    async fn act_on(&self, name: &MapName, act: SharedAct) -> Result<MapVersion, ServiceError> {
+    /// None where there is more to do in another turn.
+    async fn act_on(&self, name: &MapName, act: SharedAct) -> Result<Option<MapVersion>, ServiceError> {
         let map = self.map(name).await?;
         let outcome = map.commit_queue.submit(&Requester::from(&self.asker), Submission::Shared(act))?;
+        self.outcome_of_act(&map, outcome).await
+    }
+
+    async fn outcome_of_act(
+        &self,
+        map: &HostedMap,
+        outcome: oneshot::Receiver<Result<Committed, Refusal>>,
+    ) -> Result<Option<MapVersion>, ServiceError> {
         match outcome.await.map_err(commit_thread_ended)? {
-            Ok(committed) => Ok(map.version(committed.version())),
+            Ok(committed) => Ok(Some(map.version(committed.version()))),
             Err(Refusal::Failed(error)) => Err(error),
-            Err(Refusal::Stale) => {
-                Err(ServiceError::new(Reason::NotLeader, "the map went on meanwhile: try again"))
-            }
+            Err(Refusal::Stale) => Ok(None),
         }
     }
+}
+
+fn went_on() -> ServiceError {
+    ServiceError::new(Reason::NotLeader, "the map went on meanwhile: try again")
 }

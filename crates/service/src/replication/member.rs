@@ -33,6 +33,8 @@ pub(crate) struct Member {
     opened: Option<u64>,
     /// The last revision of the log that is known to be the same in this node's folder.
     agreed: Option<u64>,
+    /// What it published last, and where, as long as it is not known what became of it.
+    pending: Option<(Message, Position)>,
     /// Bytes of frames in a message, at most.
     piece_bytes_max: usize,
     #[cfg(test)]
@@ -66,6 +68,7 @@ impl Member {
             has_begun: false,
             opened: None,
             agreed: None,
+            pending: None,
             piece_bytes_max: PIECE_BYTES_MAX,
             #[cfg(test)]
             left_out: None,
@@ -154,7 +157,10 @@ impl Member {
     /// # Errors
     /// `NoSuchPosition` where it does not go on from what was read.
     pub(crate) fn read(&mut self, entry: Entry) -> Result<Option<OrderedChanges>, LogError> {
-        self.reading.read(entry).map_err(|_| LogError::NoSuchPosition)
+        let whole = self.reading.read(entry).map_err(|_| LogError::NoSuchPosition)?;
+        // Something is at its place: itself, or what keeps it out for good.
+        self.pending = None;
+        Ok(whole)
     }
 
     /// Begins at the log's base, and forgets what was read before.
@@ -165,7 +171,7 @@ impl Member {
         self.reading = Reading::from(self.log.base()?);
         self.has_begun = true;
         // What this node has and the log lost is given back before more comes behind it.
-        (self.agreed, self.opened) = (None, None);
+        (self.agreed, self.opened, self.pending) = (None, None, None);
         Ok(())
     }
 
@@ -177,6 +183,16 @@ impl Member {
     /// True where all that the log has is known to be what this node has: it is, or the log has nothing.
     pub(crate) fn agrees(&self) -> bool {
         self.head() == 0 || self.agreed == Some(self.head())
+    }
+
+    /// True where revision `revision` of the log is known to be what this node has.
+    pub(crate) fn agrees_at(&self, revision: u64) -> bool {
+        revision == 0 || self.agreed == Some(revision)
+    }
+
+    /// True where it is not known yet what became of what it published last.
+    pub(crate) fn has_pending(&self) -> bool {
+        self.pending.is_some()
     }
 
     /// How many of the first records one message takes: at least one, which may be cut into pieces.
@@ -235,41 +251,72 @@ impl Member {
         self.claim(self.node.clone())
     }
 
-    /// Publishes the same message until it is known what became of it.
+    /// Publishes again what it is not known of what became of it: the changes that are in their place with it. Nothing else
+    /// may take that place before: who has read it there, and finds another there later, has another history.
+    ///
+    /// # Errors
+    /// Says what is known of it now.
+    pub(crate) fn settle(&mut self) -> Result<Option<OrderedChanges>, NotOrdered> {
+        match self.pending.take() {
+            Some((message, position)) => self.send(message, position),
+            None => Ok(None),
+        }
+    }
+
+    /// Publishes a message directly behind what was read.
     fn publish(&mut self, epoch: u64, body: Body) -> Result<(), NotOrdered> {
+        if self.has_pending() {
+            let reason = "what was published before is still on its way".to_owned();
+            return Err(NotOrdered::Unknown { reason, may_count: false });
+        }
         #[cfg(test)]
         self.skip_to_end_without(Rule::Position);
         let position = self.reading.position;
         let message = Message { id: Uuid::new_v4(), after: position.id, epoch, body };
-        let mut reason = String::new();
+        // The caller has what was published, and makes it.
+        self.send(message, position).map(drop)
+    }
+
+    /// Sends the same message until it is known what became of it.
+    fn send(&mut self, message: Message, position: Position) -> Result<Option<OrderedChanges>, NotOrdered> {
+        let mut reason = None;
         for _ in 0..ATTEMPTS {
             #[cfg(test)]
             let message = self.under_new_id(&message);
-            reason = match self.log.publish(&message, position) {
-                Ok(()) => return self.note_published(position, message.clone()),
-                Err(NotPublished::Unknown(reason)) => reason,
+            let unknown = match self.log.publish(&message, position) {
+                Ok(()) => return self.read_own(position, message.clone()),
+                Err(NotPublished::Unknown(unknown)) => unknown,
                 Err(refused @ NotPublished::Refused) => match self.log.read_behind(position) {
                     Ok(behind) => match behind.first() {
                         Some(entry) if entry.message.id == message.id => {
-                            return self.note_published(position, message.clone());
+                            return self.read_own(position, message.clone());
                         }
                         Some(_) => return Err(NotOrdered::Overtaken),
                         // What was read is older than the refusal.
                         None => refused.to_string(),
                     },
+                    // It may have been there, read by others, and lost with what was before it.
+                    Err(lost @ LogError::NoSuchPosition) if reason.is_some() => {
+                        return Err(NotOrdered::Unknown { reason: lost.to_string(), may_count: true });
+                    }
                     Err(LogError::NoSuchPosition) => return Err(NotOrdered::Overtaken),
-                    Err(LogError::Unavailable(reason)) => reason,
+                    Err(LogError::Unavailable(unknown)) => unknown,
                 },
             };
+            reason = Some(unknown);
         }
-        Err(NotOrdered::Unknown { reason, may_count: true })
+        self.pending = Some((message, position));
+        Err(NotOrdered::Unknown { reason: reason.unwrap_or_default(), may_count: true })
     }
 
     /// Reads what this node published itself, as all others do.
-    fn note_published(&mut self, position: Position, message: Message) -> Result<(), NotOrdered> {
-        let read = self.reading.read(Entry { sequence: position.sequence + 1, message });
-        debug_assert!(read.is_ok(), "what was published behind what was read goes on from it");
-        Ok(())
+    fn read_own(
+        &mut self,
+        position: Position,
+        message: Message,
+    ) -> Result<Option<OrderedChanges>, NotOrdered> {
+        let entry = Entry { sequence: position.sequence + 1, message };
+        self.reading.read(entry).map_err(|_| NotOrdered::Overtaken)
     }
 }
 

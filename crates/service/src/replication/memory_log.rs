@@ -81,6 +81,11 @@ impl MemoryLog {
         self.entries.last().map_or(self.base.position, Entry::position)
     }
 
+    /// The epoch of the last message.
+    pub(crate) fn epoch(&self) -> u64 {
+        self.entries.last().map_or(self.base.epoch, |entry| entry.message.epoch)
+    }
+
     /// True where the message is behind `position` now.
     fn put(&mut self, message: &Message, position: Position) -> bool {
         if position == self.end() {

@@ -5,6 +5,7 @@ use bytes::{Bytes, BytesMut};
 use super::message::{Body, Changes, Entry, Piece, Position};
 use super::node_name::NodeName;
 use mrol_map::map::StateHash;
+use mrol_store::RECORD_BYTES_MAX;
 
 /// Where readers of a log begin: what is before it may be gone.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -117,6 +118,10 @@ impl Reading {
             Some(pieces) if pieces.goes_on_with(&next) => pieces,
             _ => return None,
         };
+        // No node writes so much: it would take the memory of all.
+        if pieces.frames.len() + next.frames.len() > RECORD_BYTES_MAX {
+            return None;
+        }
         pieces.frames.extend_from_slice(&next.frames);
         pieces.changes.piece = next.piece;
         if !next.piece.is_last() {
