@@ -10,7 +10,7 @@
 //!                             publish, acknowledge
 //! ```
 //!
-//! Of a map that several nodes share, the log that they share takes the place of the sync: `among_nodes` puts a group
+//! Of a map that several nodes share, the log that they share takes the place of the sync: `shared` puts a group
 //! into it, and makes what the other nodes put there. `histories` tries that on logs that fail.
 //!
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
@@ -20,13 +20,13 @@
 //! which all maps share, takes it out, and the map's `worker` journals it, applies it and publishes it to
 //! [`RecentChanges`]. `scan_turn` says what a scan that was prepared before may still do when its turn comes.
 
-mod among_nodes;
 mod commit_queue;
 mod commit_threads;
 #[cfg(test)]
 mod histories;
 mod recent_changes;
 mod scan_turn;
+mod shared;
 mod stop;
 mod submission;
 mod turns;

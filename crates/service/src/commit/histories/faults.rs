@@ -1,7 +1,23 @@
 //! What a hostile reader found: single faults, each in the order of events that showed it.
 
-use super::*;
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+use tokio::sync::oneshot;
+use uuid::Uuid;
+
+use super::changes::{MAP, change_of, marker, prepared, settings};
+use super::history::History;
+use super::node::{NODES, Node, Process, simulated};
+use crate::commit::submission::{Outcome, Refusal, SharedAct, Submission, Waiting, record_of};
+use crate::error::Reason;
 use crate::replication::{Base, Body, Entry, LogError, Message, NotPublished, Position, ReplicatedLog};
+use crate::replication::{Failures, MemoryLog, NodeLog, NodeName};
+use crate::work::{Asker, Requester};
+use mrol_map::geometry::Pose;
+use mrol_map::map::{Change, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol_map::voxel::VoxelSet;
+use mrol_store::Snapshot;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn lead(history: &mut History, node: usize) -> Outcome {
