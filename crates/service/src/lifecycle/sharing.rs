@@ -81,8 +81,8 @@ impl MapService {
     }
 
     /// Takes the lead of a shared map over, and gives its log what only this node has. `live` are the other nodes that
-    /// are up and have not parted from the log, with the revisions that they are at: a node that is behind one of them does
-    /// not take over.
+    /// are up and have not parted from the log, with the revisions that they are at: a node that is behind one of them
+    /// does not take over.
     ///
     /// # Errors
     /// As for [`MapService::share_map`]; `NotLeader` where another node was faster, `NoQuorum` where one is ahead.

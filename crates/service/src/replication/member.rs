@@ -251,8 +251,8 @@ impl Member {
         self.claim(self.node.clone())
     }
 
-    /// Publishes again what it is not known of what became of it: the changes that are in their place with it. Nothing else
-    /// may take that place before: who has read it there, and finds another there later, has another history.
+    /// Publishes again what it is not known of what became of it: the changes that are in their place with it. Nothing
+    /// else may take that place before: who has read it there, and finds another there later, has another history.
     ///
     /// # Errors
     /// Says what is known of it now.

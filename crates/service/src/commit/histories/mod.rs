@@ -2,10 +2,12 @@
 //! applied twice, and all nodes are equal at every revision. Where a rule is left out, histories show it.
 //!
 //!     MROL_HISTORIES=100000 cargo test --package mrol-service --lib histories
-//!     MROL_HISTORY=116 cargo test --package mrol-service --lib histories -- --nocapture    one alone, told step by step
+//!     MROL_HISTORY=116 cargo test --package mrol-service --lib histories -- --nocapture
 //!
-//! `node` is a worker on a simulated disk, `history` what happens to three of them, `check` what must hold, `tests` many
-//! histories; `faults` are single ones that somebody thought of.
+//! The last tells one alone, step by step.
+//!
+//! `node` is a worker on a simulated disk, `history` what happens to three of them, `check` what must hold, `tests`
+//! many histories; `faults` are single ones that somebody thought of.
 
 mod changes;
 mod check;

@@ -16,7 +16,8 @@ impl Worker {
         }
     }
 
-    /// That there is nothing to change holds for the newest revision alone: a leader that was overtaken does not know it.
+    /// That there is nothing to change holds for the newest revision alone: a leader that was overtaken does not know
+    /// it.
     pub(in crate::commit) fn confirm_unchanged(&mut self) -> Result<(), Refusal> {
         if self.member.is_none() {
             return Ok(());
@@ -57,8 +58,8 @@ impl Worker {
         }
     }
 
-    /// Finds out what became of what was published before, and makes it where it is in the log. `Stale` where the map went
-    /// on by it.
+    /// Finds out what became of what was published before, and makes it where it is in the log. `Stale` where the map
+    /// went on by it.
     pub(super) fn settle_pending(&mut self) -> Result<(), Refusal> {
         if self.is_log_silent {
             return Err(no_quorum(&self.name, "it did not answer just now").into());

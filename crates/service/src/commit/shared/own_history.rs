@@ -53,7 +53,8 @@ impl Worker {
         Some(self.folder.as_ref()?.records_from(revision))
     }
 
-    /// Nothing shows that the log's revision is of this node's history: it neither goes on nor takes over. Other nodes may.
+    /// Nothing shows that the log's revision is of this node's history: it neither goes on nor takes over. Other nodes
+    /// may.
     pub(super) fn cannot_tell(&self, revision: u64) -> ServiceError {
         let own = self.map.revision();
         let how = format!(
