@@ -13,7 +13,7 @@ use crate::commit::submission::{Refusal, SharedAct};
 use crate::error::{Reason, ServiceError};
 use crate::replication::{Failures, Member, MemoryLog, NodeName, Rule};
 use mrol_map::map::{MultiResolutionMap, StateHash};
-use mrol_store::Snapshot;
+use mrol_store::{Snapshot, StoreSettings};
 
 /// Steps of a history.
 const STEPS: usize = 60;
@@ -33,6 +33,8 @@ pub(super) struct History {
     pub(super) left_out: Option<Rule>,
     /// The log goes back at any time: what parts histories then is to be told.
     pub(super) is_double: bool,
+    /// How nodes keep the map.
+    pub(super) store: StoreSettings,
     /// The next change.
     pub(super) next: i32,
     pub(super) acknowledged: BTreeSet<i32>,
@@ -61,6 +63,7 @@ impl History {
             nodes: (0..NODES).map(node).collect(),
             left_out,
             is_double: false,
+            store: StoreSettings::default(),
             next: 0,
             acknowledged: BTreeSet::new(),
             refused: BTreeSet::new(),
@@ -69,6 +72,21 @@ impl History {
             is_fragile: false,
             is_told: std::env::var_os("MROL_HISTORY").is_some(),
         }
+    }
+
+    /// A history in which the log goes back at any time; where `is_pruned`, nodes keep no records that a snapshot
+    /// holds.
+    pub(super) fn of_two_faults(seed: u64, is_pruned: bool) -> Self {
+        let store = match is_pruned {
+            true => StoreSettings {
+                undo_revisions: 0,
+                undo_bytes_max: 0,
+                segment_bytes_max: 300,
+                ..Default::default()
+            },
+            false => StoreSettings::default(),
+        };
+        Self { is_double: true, store, ..Self::new(seed, None) }
     }
 
     /// Prints what happened, where one history alone is looked at.
@@ -225,7 +243,7 @@ impl History {
         match self.nodes[node].process {
             Some(_) => Ok(()),
             None => {
-                let started = self.nodes[node].start(&self.log, &self.base, self.left_out);
+                let started = self.nodes[node].start(&self.log, &self.base, self.left_out, &self.store);
                 started.map_err(|error| Violation(error.to_string()))
             }
         }

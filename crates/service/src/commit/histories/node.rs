@@ -46,8 +46,8 @@ impl Node {
         log: &Arc<Mutex<MemoryLog>>,
         base: &Snapshot,
         left_out: Option<Rule>,
+        store: &StoreSettings,
     ) -> Result<(), StoreError> {
-        let store = StoreSettings::default();
         let dir = DataDir::on(Arc::new(self.disk.clone()), Path::new("data"), store.clone()).unwrap();
         let progress = OpeningProgress::default();
         if dir.names().unwrap().is_empty() {
@@ -66,7 +66,7 @@ impl Node {
             published,
             Arc::default(),
             Arc::default(),
-            &store,
+            store,
         );
         worker.member = Some(member.without(left_out).with_pieces_of(PIECE_BYTES));
         self.process = Some(Process { worker, map, folder, recent, compared: 0 });

@@ -35,8 +35,7 @@ fn a_node_that_leaves_out_a_rule_is_found_out() {
 #[test]
 fn where_two_faults_part_histories_it_is_told() {
     for seed in 0..histories() / 3 {
-        let history = History { is_double: true, ..History::new(seed, None) };
-        if let Err(Violation(what)) = history.run() {
+        if let Err(Violation(what)) = History::of_two_faults(seed, seed % 2 == 1).run() {
             panic!("history {seed}: {what}");
         }
     }

@@ -11,7 +11,10 @@ impl Worker {
     /// Takes over: claims the lead where the log names another, gives the log what only this node has, and makes
     /// changes from then on.
     pub(super) fn lead(&mut self, live: &[(NodeName, u64)]) -> Result<(), ServiceError> {
-        self.catch_up()?;
+        match self.settle_pending() {
+            Err(Refusal::Failed(error)) => return Err(error),
+            Ok(()) | Err(Refusal::Stale) => self.catch_up()?,
+        }
         let revision = self.map.revision();
         if let Some((node, head)) = live.iter().find(|(_, head)| *head > revision) {
             let reason = format!("node {node} has revision {head}, this one {revision}");
@@ -28,7 +31,6 @@ impl Worker {
             );
             return Err(Stop::Diverged(how).refusal(&self.name));
         }
-        self.settle_pending().map_err(|refusal| self.not_settled(refusal))?;
         let Some(member) = &mut self.member else { return Ok(()) };
         if !member.is_named() {
             let claimed = member.claim_for_itself();
@@ -66,10 +68,13 @@ impl Worker {
             let state = self.published.recent.hashes_at(head).map(|hashes| hashes.state);
             tracing::warn!(map = %self.name, from = head + 1, "the log lost changes that this node has: they are given back");
             let ordered = member.order(&records[..member.fitting(&records)], state);
-            if ordered.is_ok() && member.head() > head {
-                member.note_agreed(member.head());
-            } else {
-                return self.settled(ordered);
+            let given = member.head();
+            if ordered.is_ok() {
+                member.note_agreed(given);
+            }
+            self.settled(ordered)?;
+            if given == head {
+                return Err(no_quorum(&self.name, "it has what is given back, and not as a change"));
             }
         }
         Ok(())
@@ -91,12 +96,5 @@ impl Worker {
             NotOrdered::NotLeader | NotOrdered::Overtaken => not_leader(&self.name, leader),
             NotOrdered::Unknown { reason, .. } => no_quorum(&self.name, &reason),
         })
-    }
-
-    fn not_settled(&self, refusal: Refusal) -> ServiceError {
-        match refusal {
-            Refusal::Failed(error) => error,
-            Refusal::Stale => not_leader(&self.name, self.member.as_ref().and_then(Member::other_leader)),
-        }
     }
 }
