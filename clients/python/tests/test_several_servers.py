@@ -1,5 +1,6 @@
 """Clients that are given the addresses of several servers."""
 
+import json
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -126,6 +127,37 @@ def test_a_change_is_made_once_and_one_without_an_id_is_not_sent_again(tmp_path:
             through.rename_map("m", "n")
         assert proxy.connections == before + 1
         assert [info.name for info in direct.maps().maps] == ["n"]
+
+
+@pytest.mark.parametrize("refusal", ["map_not_found", "guess_required", "overloaded"])
+def test_a_change_that_was_lost_is_not_told_as_refused_by_another_server(tmp_path: Path, refusal: str) -> None:
+    is_broken = False
+    with (
+        serving(tmp_path / "former") as server,
+        DroppingProxy(server.address, lambda _: (WHOLE, 20) if is_broken else None) as proxy,
+        ScriptedServer(answering(refused(refusal))) as other,
+    ):
+        direct = mrol.connect(server.address).map("m", resolution=0.1)
+        fill(direct, 3)
+        client = mrol.connect([proxy.address, other.address], patience_s=0)
+        m = client.map("m")
+        client.close()
+        is_broken = True
+        with pytest.raises(mrol.MrolError) as failed:
+            m.delete(POINT)
+        assert failed.value.repeat_with.keys() == {"request_id"}
+        assert direct.describe().revision == 2
+        assert direct.delete(POINT, **failed.value.repeat_with).replayed
+        # What changes nothing was refused, whatever came before.
+        with pytest.raises(mrol.ServerError) as failed:
+            m.query(POINT)
+        assert not failed.value.repeat_with
+
+
+def refused(reason: str) -> bytes:
+    """The answer of a server that refuses."""
+    body = json.dumps({"code": "unavailable", "reason": reason, "detail": "no"}).encode()
+    return answer(body, status=b"503 Service Unavailable")
 
 
 def other_name_of(server: Server) -> str:

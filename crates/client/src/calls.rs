@@ -34,8 +34,10 @@ pub(super) struct Calls {
 /// Whether a call may be sent to another server after it failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Repeat {
-    /// It changes nothing, or has an id by which the servers know it.
+    /// It changes nothing.
     Always,
+    /// It has an id by which the servers know it.
+    WithId,
     /// Not once it was sent: it might be done twice.
     UnlessSent,
 }
@@ -58,8 +60,8 @@ impl Repeat {
             ClientError::Lost { .. } if self != Self::UnlessSent => Next::Leave,
             ClientError::Refused { .. } if said(Reason::Draining) || said(Reason::Starting) => Next::Leave,
             ClientError::Refused { .. } if error.reason() == Some(MAP_ELSEWHERE) => Next::Elsewhere,
-            // Another server may be farther.
-            ClientError::Refused { .. } if said(Reason::RevisionNotReached) => Next::Elsewhere,
+            // Another server may be farther, and later questions need not wait for this one.
+            ClientError::Refused { .. } if said(Reason::RevisionNotReached) => Next::Leave,
             _ => Next::End,
         }
     }
@@ -148,7 +150,7 @@ impl Calls {
         F: Fn(Connection, Request<M>) -> Fut,
         Fut: Future<Output = Result<T, ClientError>>,
     {
-        let repeat = if with_id { Repeat::Always } else { Repeat::UnlessSent };
+        let repeat = if with_id { Repeat::WithId } else { Repeat::UnlessSent };
         let answer = self.send(message, self.until(), repeat, &send).await;
         self.noted(map, answer)
     }
@@ -255,6 +257,7 @@ where
     Fut: Future<Output = Result<T, ClientError>>,
 {
     let mut tried = Tried::default();
+    let mut lost = None;
     while let Some((place, connection)) = several.connection(&mut tried, until).await {
         let left = until.map(|until| until.saturating_duration_since(Instant::now()));
         let mut waiting = Waiting { connection: &connection, until };
@@ -265,7 +268,8 @@ where
             Err(error) => error,
         };
         match repeat.after(&error) {
-            Next::End => return Err(error),
+            // The server that it was sent to before may have done it: that this one refuses it does not say.
+            Next::End => return Err(lost.unwrap_or(error)),
             Next::Leave => connection.give_up(),
             Next::Elsewhere => {}
         }
@@ -273,9 +277,12 @@ where
         if matches!(error, ClientError::Refused { .. }) {
             tried.exclude(place);
         }
+        if repeat == Repeat::WithId && matches!(error, ClientError::Lost { .. }) {
+            lost = lost.or_else(|| Some(error.clone()));
+        }
         tried.note(error);
     }
-    Err(several.failure(tried))
+    Err(lost.unwrap_or_else(|| several.failure(tried)))
 }
 
 /// A call under way. Where it is dropped when its time is up, the server may hang: later calls go to another.
@@ -320,9 +327,8 @@ mod tests {
         for reason in ["draining", "starting"] {
             assert_eq!(next(&refused(reason)), "leave", "{reason}");
         }
-        for reason in [MAP_ELSEWHERE, "revision_not_reached"] {
-            assert_eq!(next(&refused(reason)), "elsewhere", "{reason}");
-        }
+        assert_eq!(next(&refused("revision_not_reached")), "leave");
+        assert_eq!(next(&refused(MAP_ELSEWHERE)), "elsewhere");
         for reason in ["overloaded", "map_not_found", "guess_required", "outcome_unknown", "key_unknown"] {
             assert_eq!(next(&refused(reason)), "end", "{reason}");
         }

@@ -3,7 +3,7 @@
 MrolError                 itself: a map file that changed, or could not be read, while it was sent
   ArgumentError           an argument was refused before anything was sent (a ValueError)
   ScanFileError           a scan file that is broken or none (a ValueError)
-  ServerError             the server refused; it changed nothing, but for the reason `outcome_unknown`
+  ServerError             the server refused; it changed nothing, but where `repeat_with` says that nobody knows
     InvalidArgument, Unauthenticated, PermissionDenied, NotFound, Conflict, FailedPrecondition,
     ResourceExhausted, DeadlineExceeded, Unavailable, Internal
   TransportError          there is no answer
@@ -71,6 +71,8 @@ class MrolError(Exception):
     """
 
     repeat_with: Mapping[str, Any] = MappingProxyType({})
+    # Its request had been sent before, and that attempt was lost on the way: it may have been done.
+    _is_after_loss = False
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*(masked(given) if isinstance(given, str) else given for given in arguments))
@@ -83,7 +85,7 @@ OUTCOME_UNKNOWN = ("outcome_unknown", "deadline_exceeded")
 def is_outcome_unknown(error: MrolError) -> bool:
     """Whether the change that failed so may have been made."""
     if isinstance(error, ServerError):
-        return error.reason in OUTCOME_UNKNOWN or error.code in OUTCOME_UNKNOWN
+        return error._is_after_loss or error.reason in OUTCOME_UNKNOWN or error.code in OUTCOME_UNKNOWN
     return isinstance(error, TransportError | BadAnswer)
 
 

@@ -14,11 +14,11 @@ PASSING = frozenset({"overloaded", "starting", "draining", "catalog_busy", "body
 """Reasons of refusals that are over soon. A refused request changed nothing, so it may be sent again, whatever it is."""
 
 
-GOING = frozenset({"starting", "draining"})
-"""Reasons of refusals by a server that is not there yet, or no more: another one is asked."""
-
 LATE = "revision_not_reached"
 """The reason of a refusal by a server that has not got the `min_revision` of a question: another one may have it."""
+
+GOING = frozenset({"starting", "draining", LATE})
+"""Reasons of refusals by a server that is not there yet, or no more, or late: another one is asked, and later calls begin there."""
 
 
 class Attempts:
@@ -35,6 +35,13 @@ class Attempts:
         self._unreachable: list[str] = []
         self._first: MrolError | None = None
         self._has_renewed = False
+        self._was_lost = False
+
+    def _note(self, error: MrolError) -> None:
+        """Notes a loss on the way: that a later attempt is refused does not say that the lost one changed nothing."""
+        if isinstance(error, ServerError):
+            error._is_after_loss = self._was_lost
+        self._was_lost |= isinstance(error, TransportError) and not isinstance(error, ConnectFailed)
 
     def may_renew(self, error: MrolError, request: Request, was_kept: bool) -> bool:
         """Whether the call is to be sent to the same one of several servers again, over a new connection: once.
@@ -45,6 +52,7 @@ class Attempts:
             self._servers > 1 and was_kept and not self._has_renewed and isinstance(error, ConnectionLost) and request.is_repeatable
         )
         self._has_renewed |= may
+        self._was_lost |= may
         return may
 
     def is_over_here(self, error: MrolError) -> bool:
@@ -55,10 +63,9 @@ class Attempts:
 
     def may_go_on(self, error: MrolError, request: Request) -> bool:
         """Whether the call is to be sent to another server now."""
-        may = self._others > 0 and (
-            (self.is_over_here(error) and _may_be_repeated(error, request))
-            or (isinstance(error, ServerError) and error.reason == LATE)
-        )
+        self._note(error)
+        is_late = isinstance(error, ServerError) and error.reason == LATE
+        may = self._others > 0 and self.is_over_here(error) and (is_late or _may_be_repeated(error, request))
         self._others -= may
         if may and isinstance(error, ConnectFailed):
             self._unreachable.append(str(error))

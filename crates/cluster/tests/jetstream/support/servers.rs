@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use super::skipped::skipped;
 
 /// Path of the program `nats-server`.
-const PROGRAM: &str = "MROL_NATS_SERVER";
+const PROGRAM: &str = "NATS_SERVER_PROGRAM";
 
 /// How long servers may take until they serve. Three elect a leader within some seconds; the machine may be busy.
 const SERVING_WITHIN: Duration = Duration::from_secs(40);
