@@ -192,6 +192,23 @@ async fn a_change_with_an_id_is_sent_again_and_made_once() {
 }
 
 #[tokio::test]
+async fn a_change_that_was_lost_is_not_told_as_refused_by_another_server() {
+    let (daemon, first, _second, _) = with_two_lines().await;
+    let without_the_map = Daemon::start().await;
+    let servers = format!("http://{},http://{}", first.address, without_the_map.grpc);
+    let client = Client::connect(&servers).await.unwrap();
+    first.mute();
+    let changing = tokio::spawn({
+        let client = client.clone();
+        async move { client.delete_voxels(&map(), deletion(Some("d-1"))).await }
+    });
+    wait_until(async || daemon.contents(MAP).await.0 == 2).await;
+    first.cut().await;
+    let lost = changing.await.unwrap().unwrap_err();
+    assert!(matches!(lost, ClientError::Lost { .. }), "{lost}");
+}
+
+#[tokio::test]
 async fn a_stream_of_questions_begins_at_a_server_that_is_there() {
     let (_daemon, first, _second, client) = with_two_lines().await;
     first.cut().await;
