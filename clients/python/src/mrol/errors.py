@@ -71,8 +71,6 @@ class MrolError(Exception):
     """
 
     repeat_with: Mapping[str, Any] = MappingProxyType({})
-    # Its request had been sent before, and that attempt was lost on the way: it may have been done.
-    _is_after_loss = False
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*(masked(given) if isinstance(given, str) else given for given in arguments))
@@ -85,7 +83,7 @@ OUTCOME_UNKNOWN = ("outcome_unknown", "deadline_exceeded")
 def is_outcome_unknown(error: MrolError) -> bool:
     """Whether the change that failed so may have been made."""
     if isinstance(error, ServerError):
-        return error._is_after_loss or error.reason in OUTCOME_UNKNOWN or error.code in OUTCOME_UNKNOWN
+        return error.is_after_loss or error.reason in OUTCOME_UNKNOWN or error.code in OUTCOME_UNKNOWN
     return isinstance(error, TransportError | BadAnswer)
 
 
@@ -127,7 +125,10 @@ class ServerError(MrolError):
 
     `reason` is a stable word for programs (`docs/guide/api.md` lists all with what to do), `code` the kind of failure, `status`
     that of HTTP, `message` a sentence with field, value and limit, and `retry_after_s` how long to wait where the server can tell.
+    `is_after_loss` says that the request had been sent before, and that attempt was lost: a change may have been made by it.
     """
+
+    is_after_loss = False
 
     def __init__(self, status: int, code: str, reason: str, message: str, retry_after_s: float | None = None) -> None:
         super().__init__(f"{message} ({reason})")

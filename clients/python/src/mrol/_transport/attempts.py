@@ -40,7 +40,7 @@ class Attempts:
     def _note(self, error: MrolError) -> None:
         """Notes a loss on the way: that a later attempt is refused does not say that the lost one changed nothing."""
         if isinstance(error, ServerError):
-            error._is_after_loss = self._was_lost
+            error.is_after_loss = self._was_lost
         self._was_lost |= isinstance(error, TransportError) and not isinstance(error, ConnectFailed)
 
     def may_renew(self, error: MrolError, request: Request, was_kept: bool) -> bool:
