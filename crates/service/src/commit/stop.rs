@@ -71,7 +71,7 @@ pub(super) fn revisions_used_up(name: &MapName) -> ServiceError {
     ServiceError::new(Reason::RevisionsUsedUp, message)
 }
 
-/// What to say to whose change another node has to make.
+/// The refusal of a change that another node has to make.
 pub(super) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceError {
     let message = match leader {
         Some(leader) => format!("node {leader} makes the changes of map {name}: ask there"),
@@ -80,12 +80,12 @@ pub(super) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceEr
     ServiceError::new(Reason::NotLeader, message).retry_after(LEADER_SOON)
 }
 
-/// What to say of a map that nobody shared yet, to a node that is told to do something about it.
+/// The refusal to follow or lead a map that has no log yet.
 pub(super) fn not_shared(name: &MapName) -> ServiceError {
     ServiceError::new(Reason::NotLeader, format!("map {name} has no log yet: share it first"))
 }
 
-/// What to say to whose change is in the log, where this node's folder fails then.
+/// The error of a change that is in the log, after which this node's folder failed.
 pub(super) fn not_kept(name: &MapName, error: &ServiceError) -> ServiceError {
     let message = format!(
         "this change of map {name} is in its log, and this node could not keep it ({error}): other nodes make it; the same \
@@ -94,14 +94,14 @@ pub(super) fn not_kept(name: &MapName, error: &ServiceError) -> ServiceError {
     ServiceError::new(Reason::OutcomeUnknown, message)
 }
 
-/// What to say where the log of a map does not answer: nothing was changed.
+/// The refusal where the log of a map does not answer: nothing was changed.
 pub(super) fn no_quorum(name: &MapName, reason: &str) -> ServiceError {
     let message =
         format!("the log of map {name} acknowledges nothing ({reason}): nothing was changed, try again");
     ServiceError::new(Reason::NoQuorum, message).retry_after(LEADER_SOON)
 }
 
-/// What to say to whose change was handed to a log that did not answer.
+/// The error of a change that was handed to a log which did not answer.
 pub(super) fn not_acknowledged(name: &MapName, reason: &str) -> ServiceError {
     let message = format!(
         "the log of map {name} did not acknowledge this change ({reason}): it may be there, now or later; the same scan_id or \

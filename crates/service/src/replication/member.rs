@@ -175,6 +175,11 @@ impl Member {
         Ok(())
     }
 
+    /// Has the node begin at the log's base when it reads next: it did not make what it read last.
+    pub(crate) fn lose_place(&mut self) {
+        (self.has_begun, self.opened) = (false, None);
+    }
+
     /// Notes that the log's revision and this node's are the same.
     pub(crate) fn note_agreed(&mut self, revision: u64) {
         self.agreed = Some(revision);
@@ -251,8 +256,10 @@ impl Member {
         self.claim(self.node.clone())
     }
 
-    /// Publishes again what it is not known of what became of it: the changes that are in their place with it. Nothing
-    /// else may take that place before: who has read it there, and finds another there later, has another history.
+    /// Publishes the last message again, where its outcome is not known. Returns the changes that are whole with it.
+    ///
+    /// Nothing else is published at its place before. A follower may have read it there: if another message took its
+    /// place, the two nodes would have different histories.
     ///
     /// # Errors
     /// Says what is known of it now.

@@ -110,6 +110,10 @@ fn nothing_is_made_upon_a_history_that_was_not_compared() {
     let process = history.nodes[2].process.as_ref().unwrap();
     let agrees = process.worker.member.as_ref().unwrap().agrees();
     assert!(followed.is_err(), "made revision 6 upon 4 and 5 of another history; agrees: {agrees}");
+    // It says the same when it is asked again, and is not at the place of what it did not make.
+    let again = follow(&mut history, 2);
+    assert_eq!(format!("{again:?}"), format!("{followed:?}"));
+    assert!(history.nodes[2].process.as_ref().unwrap().worker.stopped.get().is_none());
 }
 
 #[test]

@@ -66,8 +66,12 @@ impl Worker {
             }
             for entry in entries {
                 let read = self.member.as_mut().map(|member| member.read(entry)).transpose()?;
-                if let Some(changes) = read.flatten() {
-                    self.make_ordered(&changes, own)?;
+                let Some(changes) = read.flatten() else { continue };
+                if let Err(error) = self.make_ordered(&changes, own) {
+                    if let Some(member) = &mut self.member {
+                        member.lose_place();
+                    }
+                    return Err(error.into());
                 }
             }
             if until.is_some_and(|until| Instant::now() >= until) {
