@@ -200,6 +200,7 @@ impl Config {
             robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.of_robot())).collect(),
             filter: FilterSettings { hashes, bits_per_key },
             sleep_after: self.maps.sleep_after(),
+            cluster: None,
         }
     }
 

@@ -6,15 +6,16 @@
 //!
 //! 1. `error`, `setting`, `limits`, `request`: how a request fails, what a setting is, how much a request may ask, what
 //!    it asks and how it is answered.
-//! 2. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
-//! 3. `replication`, `commit`: a log that several nodes share; how changes of a map become durable, then visible, then
-//!    acknowledged.
-//! 4. `maps`: the maps by name, and what a hosted map is made of.
-//! 5. `map_service`: [`MapService`], the handle of which every operation is a method.
-//! 6. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.
+//! 2. `replication`, `cluster`: a log that several nodes share, and what one of them asks of the others.
+//! 3. `resources`, `caller`, `observer`, `settings`, `work`: disk and memory, callers, observers, settings, threads.
+//! 4. `commit`: how changes of a map become durable, then visible, then acknowledged.
+//! 5. `maps`: the maps by name, and what a hosted map is made of.
+//! 6. `map_service`: [`MapService`], the handle of which every operation is a method.
+//! 7. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.
 
 mod caller;
 mod change;
+mod cluster;
 mod commit;
 mod error;
 mod lifecycle;
@@ -38,7 +39,10 @@ mod watch;
 mod work;
 
 pub use caller::{AllowedMaps, AllowedScans};
+pub use cluster::{Cluster, Forward, Later, OnBehalf, SharedCatalog};
+pub use commit::Lead;
 pub use error::{ErrorCode, Reason, ReportedBy, ServiceError};
+pub use lifecycle::SharedMap;
 pub use limits::{Limits, Marks};
 pub use map_service::MapService;
 pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};

@@ -4,11 +4,13 @@
 use std::sync::Arc;
 
 use super::caller::{AllowedMaps, AllowedScans};
-use super::commit::{Refusal, Step};
+use super::cluster::{Cluster, OnBehalf};
+use super::commit::{Lead, Refusal, Step, not_leader};
 use super::error::{Reason, ServiceError};
 use super::limits::Limits;
 use super::maps::{Catalog, HostedMap};
 use super::observer::{Change, End, Ended, Outcome};
+use super::replication::NodeName;
 use super::resources::{Readings, ResourceBudget, Shortage};
 use super::settings::ServiceSettings;
 use super::work::{Asker, FreeThread, Lane, LaneUse, Lanes, Requester};
@@ -30,6 +32,8 @@ pub struct MapService {
     pub(super) caller: Option<CallerName>,
     /// Whom its work counts for, where callers take turns.
     pub(super) asker: Asker,
+    /// True of what another node asks for a caller of its own: it is taken no further.
+    pub(super) is_forwarded: bool,
 }
 
 #[derive(Debug)]
@@ -72,6 +76,7 @@ impl MapService {
             scans: AllowedScans::default(),
             caller: None,
             asker: Asker::default(),
+            is_forwarded: false,
         })
     }
 
@@ -83,8 +88,13 @@ impl MapService {
         allowed_maps: AllowedMaps,
         scans: AllowedScans,
     ) -> Self {
-        let asker = self.asker.clone();
-        Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller, asker }
+        Self { allowed_maps, scans, caller, ..self.clone() }
+    }
+
+    /// The same for what another node of the cluster asks for a caller of its own: it is taken no further.
+    #[must_use]
+    pub fn forwarded(self) -> Self {
+        Self { is_forwarded: true, ..self }
     }
 
     /// The same, where work counts for `asker`: callers take turns at the threads for all that uses the CPU.
@@ -195,6 +205,32 @@ impl MapService {
     ) -> Result<Result<Committed, Refusal>, ServiceError> {
         let mut submitted = Submitted { service: self, operation, map, outcome };
         (&mut submitted.outcome).await.map_err(commit_thread_ended)
+    }
+
+    /// For whom this handle asks another node.
+    pub(super) fn on_behalf(&self) -> OnBehalf {
+        OnBehalf { caller: self.caller.clone() }
+    }
+
+    /// The node to be asked for a change of a map in the place of this one; none where this one makes it.
+    ///
+    /// # Errors
+    /// `NotLeader` where another node asked this one, and `NoQuorum` where none leads yet.
+    pub(super) fn leader_elsewhere(
+        &self,
+        map: &HostedMap,
+    ) -> Result<Option<(NodeName, &Cluster)>, ServiceError> {
+        let Some(cluster) = &self.inner.settings.cluster else { return Ok(None) };
+        match map.lead() {
+            Lead::Shared { leader: Some(leader), is_here: false, .. } if leader != cluster.node => {
+                match self.is_forwarded {
+                    true => Err(not_leader(&map.name, Some(&leader))),
+                    false => Ok(Some((leader, cluster))),
+                }
+            }
+            // The map's worker says why.
+            _ => Ok(None),
+        }
     }
 
     /// The map of that name, which is opened where it sleeps.

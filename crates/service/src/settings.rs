@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::cluster::Cluster;
 use super::limits::Limits;
 use super::observer::Observer;
 use super::request::ScanRequest;
@@ -51,6 +52,8 @@ pub struct ServiceSettings {
     pub filter: FilterSettings,
     /// Time after which a map that nobody uses leaves memory; never where none.
     pub sleep_after: Option<Duration>,
+    /// The other nodes of the cluster that this server is a node of; none of a server by itself.
+    pub cluster: Option<Cluster>,
 }
 
 /// Settings of a robot, where its requests do not say.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::keep_out::decided;
-use crate::commit::{Refusal, Submission};
+use crate::commit::{Lead, Refusal, Submission};
 use crate::error::ServiceError;
 use crate::map_service::{MapService, commit_thread_ended};
 use crate::maps::HostedMap;
@@ -32,11 +32,12 @@ impl MapService {
 }
 
 impl HostedMap {
-    /// True of a map that takes changes and has a keep-out whose time is up. Where keep-outs change just now, the next
-    /// call sees them.
+    /// True of a map that takes changes here and has a keep-out whose time is up. Where keep-outs change just now, the
+    /// next call sees them.
     fn has_expired(&self, now_ns: i64) -> bool {
         let has_one = |keep_outs: Arc<KeepOuts>| keep_outs.expired(now_ns).next().is_some();
-        self.commit_queue.stopped().is_none() && self.map.try_keep_outs().is_some_and(has_one)
+        let is_made_here = matches!(self.lead(), Lead::Alone | Lead::Shared { is_here: true, .. });
+        is_made_here && self.commit_queue.stopped().is_none() && self.map.try_keep_outs().is_some_and(has_one)
     }
 
     /// Ends the keep-outs whose time is up; how many ended. One that cannot be ended is left for the next call, and

@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock, Weak};
 use tokio::sync::{oneshot, watch};
 
 use super::commit_threads::{CommitThreads, Turn};
+use super::lead::Lead;
 use super::stop::Stop;
 use super::submission::{Outcome, Submission, Waiting};
 use super::turns::Turns;
@@ -32,6 +33,7 @@ pub(crate) struct CommitQueue {
     /// True once no other revision will come: those who wait for one hold the map, and so its queue.
     ended: watch::Sender<bool>,
     durations: Arc<SharedDurations>,
+    lead: watch::Sender<Lead>,
 }
 
 /// The changes that wait, and the worker that makes them. One thread at a time has a turn.
@@ -74,6 +76,7 @@ impl CommitQueue {
     ) -> Self {
         let stopped = Arc::new(OnceLock::new());
         let durations = Arc::<SharedDurations>::default();
+        let lead = published.lead.clone();
         let worker =
             Worker::new(name, map, folder, published, Arc::clone(&stopped), Arc::clone(&durations), settings);
         let state = State {
@@ -97,6 +100,7 @@ impl CommitQueue {
             stopped,
             ended: watch::Sender::new(false),
             durations,
+            lead,
         }
     }
 
@@ -154,6 +158,16 @@ impl CommitQueue {
     /// Why the map takes no more changes.
     pub(crate) fn stopped(&self) -> Option<&Stop> {
         self.stopped.get()
+    }
+
+    /// The map takes no changes before it has joined the log that other nodes read too.
+    pub(crate) fn wait_for_log(&self) {
+        self.lead.send_replace(Lead::NotJoined);
+    }
+
+    /// Who makes the changes of the map; the receiver hears when that is another.
+    pub(crate) fn lead(&self) -> watch::Receiver<Lead> {
+        self.lead.subscribe()
     }
 
     /// The map is deleted: it takes no more changes.

@@ -24,6 +24,7 @@ mod commit_queue;
 mod commit_threads;
 #[cfg(test)]
 mod histories;
+mod lead;
 mod recent_changes;
 mod scan_turn;
 mod shared;
@@ -35,9 +36,10 @@ mod worker;
 
 pub(crate) use commit_queue::CommitQueue;
 pub(crate) use commit_threads::CommitThreads;
+pub use lead::Lead;
 pub(crate) use recent_changes::{RecentChanges, WatchedLevel};
 pub(crate) use scan_turn::TurnLimits;
-pub(crate) use stop::Stop;
+pub(crate) use stop::{Stop, not_leader};
 pub(crate) use submission::{Decided, Prepared, Refusal, RobotLock, SharedAct, Step, Submission, record_of};
 pub(crate) use watched_change::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, has_looked_into};
 pub(crate) use worker::Published;

@@ -72,12 +72,21 @@ pub(super) fn revisions_used_up(name: &MapName) -> ServiceError {
 }
 
 /// The refusal of a change that another node has to make.
-pub(super) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceError {
+pub(crate) fn not_leader(name: &MapName, leader: Option<&NodeName>) -> ServiceError {
     let message = match leader {
         Some(leader) => format!("node {leader} makes the changes of map {name}: ask there"),
         None => format!("no node has taken over map {name} yet: try again"),
     };
     ServiceError::new(Reason::NotLeader, message).retry_after(LEADER_SOON)
+}
+
+/// The refusal of a change of a map that waits for its log.
+pub(super) fn not_joined(name: &MapName) -> ServiceError {
+    let message = format!(
+        "map {name} of this node has not joined its log: it does so once NATS answers, or was never taken into the cluster \
+         (`mrol cluster status` tells, `mrol cluster adopt` takes it in)"
+    );
+    ServiceError::new(Reason::NoQuorum, message).retry_after(LEADER_SOON)
 }
 
 /// The refusal to follow or lead a map that has no log yet.

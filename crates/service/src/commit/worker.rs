@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{oneshot, watch};
 
+use super::lead::Lead;
 use super::recent_changes::RecentChanges;
 use super::scan_turn::{ScanTurn, TurnLimits};
 use super::stop::{Stop, outcome_unknown, revisions_used_up};
@@ -32,6 +33,8 @@ pub(crate) struct Published {
     pub(crate) announced: watch::Sender<u64>,
     /// The last changes, for those who watch the map.
     pub(crate) recent: Arc<RecentChanges>,
+    /// Which node makes its changes, for those who ask.
+    pub(crate) lead: watch::Sender<Lead>,
 }
 
 /// What the changes of a map are made with, by one thread at a time.
@@ -132,6 +135,15 @@ impl Worker {
             }
         }
         self.commit_group(&mut group);
+        self.tell_lead();
+    }
+
+    /// Tells whoever asks who makes the changes of a map that nodes share.
+    fn tell_lead(&self) {
+        if let Some(member) = &self.member {
+            let now = Lead::of(member);
+            self.published.lead.send_if_modified(|lead| std::mem::replace(lead, now.clone()) != now);
+        }
     }
 
     /// Cuts a scan to what it may still do now that its turn comes.
@@ -234,7 +246,7 @@ impl Worker {
 
     /// Applies a change and publishes it; `acknowledge` is told in between.
     pub(super) fn apply(&self, change: Change, acknowledge: impl FnOnce(Committed)) {
-        let Published { announced, recent } = &self.published;
+        let Published { announced, recent, .. } = &self.published;
         let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
         debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
         announced.send_replace(committed.revision);

@@ -5,5 +5,7 @@ mod map_file;
 mod operations;
 mod sharing;
 
+pub use sharing::SharedMap;
+
 #[cfg(test)]
 pub(crate) use map_file::from_file;

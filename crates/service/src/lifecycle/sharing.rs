@@ -7,7 +7,7 @@ use tokio::sync::oneshot;
 use uuid::Uuid;
 
 use super::map_file::from_file;
-use crate::commit::{Refusal, SharedAct, Submission};
+use crate::commit::{Lead, Refusal, SharedAct, Submission};
 use crate::error::{Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
 use crate::maps::{BuiltMap, HostedMap};
@@ -17,7 +17,34 @@ use crate::work::Requester;
 use mrol_map::map::{Committed, MapName};
 use mrol_map::util::StopSignal;
 
+/// A node's copy of a map that others share too.
+#[derive(Debug, Clone)]
+pub struct SharedMap {
+    /// Its name here.
+    pub name: MapName,
+    /// Its version here.
+    pub version: MapVersion,
+    /// Which node makes its changes, as far as is known here.
+    pub lead: Lead,
+    /// Why it takes no changes here any more.
+    pub failure: Option<String>,
+}
+
 impl MapService {
+    /// The copies that this node has of maps, by name: those that it shares and those that have not joined their log.
+    pub fn shared_maps(&self) -> Vec<SharedMap> {
+        let describe = |map: Arc<HostedMap>| SharedMap {
+            name: map.name.clone(),
+            version: map.version_now(),
+            lead: map.lead(),
+            failure: map.failure().map(str::to_owned),
+        };
+        let maps = self.inner.catalog.within(&self.allowed_maps).into_iter();
+        let mut shared: Vec<_> = maps.map(describe).filter(|map| map.lead != Lead::Alone).collect();
+        shared.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+        shared
+    }
+
     /// Takes in a copy of a map that another node has, as the same incarnation: under its uuid, to be shared by
     /// [`MapService::share_map`].
     ///
@@ -60,7 +87,6 @@ impl MapService {
         }
         let join = SharedAct::Join { log, node, map: map.uuid };
         let joined = map.commit_queue.submit(&Requester::from(&self.asker), Submission::Shared(join))?;
-        map.note_shared();
         match self.outcome_of_act(&map, joined).await? {
             Some(version) => Ok(version),
             None => self.follow_map(name, None).await,

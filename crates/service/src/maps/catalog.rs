@@ -15,7 +15,7 @@ use super::named::{Named, Place};
 use super::opening::{find_all, maps_at_once, not_stored, waiting_within};
 use super::same_settings::same_settings;
 use crate::caller::{AllowedMaps, Reachable};
-use crate::commit::CommitThreads;
+use crate::commit::{CommitThreads, Lead};
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::request::{MapVersion, UnavailableMap};
 use crate::settings::ServiceSettings;
@@ -45,6 +45,8 @@ pub(crate) struct Catalog {
     pub(super) progress: OpeningProgress,
     /// True once every map of the data folder was opened, or could not be.
     pub(super) are_open: watch::Sender<bool>,
+    /// True of a node of a cluster: no map takes changes before it has joined its log.
+    is_clustered: bool,
     writing: tokio::sync::Mutex<()>,
 }
 
@@ -54,8 +56,8 @@ impl Catalog {
         settings: &ServiceSettings,
         progress: &OpeningProgress,
     ) -> Result<Self, ServiceError> {
-        let ServiceSettings { data_dir, store: settings, limits, .. } = settings;
-        let open = |path: &Path| DataDir::open(path, settings.clone());
+        let ServiceSettings { data_dir, store, limits, .. } = settings;
+        let open = |path: &Path| DataDir::open(path, store.clone());
         let data_dir = data_dir.as_deref().map(open).transpose().map_err(not_stored)?;
         let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
         let maps = maps.unwrap_or_default();
@@ -63,12 +65,13 @@ impl Catalog {
             are_open: watch::Sender::new(maps.asleep.is_empty()),
             maps: RwLock::new(Rank::Brief, maps),
             data_dir: data_dir.map(Arc::new),
-            settings: settings.clone(),
+            settings: store.clone(),
             commit_threads: CommitThreads::start()?,
             openings: Arc::new(Semaphore::new(maps_at_once())),
             waiting: waiting_within(limits.requests_max),
             wakes: AtomicU64::new(0),
             progress: progress.clone(),
+            is_clustered: settings.cluster.is_some(),
             writing: Default::default(),
         })
     }
@@ -259,8 +262,16 @@ impl Catalog {
             Ok(Arc::new(HostedMap::new(&threads, of, uuid, map, folder, &settings)))
         })
         .await?;
-        self.maps.write().open.insert(name.clone(), Arc::clone(&map));
+        self.serve(&mut self.maps.write(), &map);
         Ok(map)
+    }
+
+    /// Serves a map from now on, which was opened or made.
+    pub(super) fn serve(&self, maps: &mut Named, map: &Arc<HostedMap>) {
+        if self.is_clustered && map.lead() == Lead::Alone {
+            map.commit_queue.wait_for_log();
+        }
+        maps.open.insert(map.name.clone(), Arc::clone(map));
     }
 
     /// Takes a map out; its last version.

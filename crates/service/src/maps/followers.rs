@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::full_state::FullStates;
-use crate::commit::{CommitQueue, Published, RecentChanges};
+use crate::commit::{CommitQueue, Lead, Published, RecentChanges};
 use mrol_map::map::ContentHistory;
 
 /// Everything that the followers of a map read.
@@ -26,7 +26,8 @@ impl Followers {
     pub(super) fn new(revision: u64, history: ContentHistory, watch_bytes_max: usize) -> (Self, Published) {
         let (announcing, announced) = watch::channel(revision);
         let recent = Arc::new(RecentChanges::new(revision, history, watch_bytes_max));
-        let published = Published { announced: announcing, recent: Arc::clone(&recent) };
+        let lead = watch::Sender::new(Lead::Alone);
+        let published = Published { announced: announcing, recent: Arc::clone(&recent), lead };
         (Self { announced, recent, whole_states: FullStates::default() }, published)
     }
 

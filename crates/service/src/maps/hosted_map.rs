@@ -1,6 +1,6 @@
 //! A map under a name: what the service keeps about it besides the map itself.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use super::followers::Followers;
 use super::keep_out_expiry::KeepOutExpiry;
 use super::robots::Robots;
 use super::snapshots::Snapshots;
-use crate::commit::{CommitQueue, CommitThreads, Stop};
+use crate::commit::{CommitQueue, CommitThreads, Lead, Stop};
 use crate::error::{Reason, ServiceError};
 use crate::request::{MapInfo, MapStorage, MapVersion};
 use crate::work::ended_early;
@@ -38,8 +38,6 @@ pub(crate) struct HostedMap {
     pub(super) snapshots: Snapshots,
     pub(crate) keep_out_expiry: KeepOutExpiry,
     last_use: LastUse,
-    /// True once other nodes share it: it is kept in memory, under its name.
-    is_shared: AtomicBool,
 }
 
 /// What is left of a map that was closed.
@@ -138,18 +136,17 @@ impl HostedMap {
             snapshots: Snapshots::default(),
             keep_out_expiry: KeepOutExpiry::default(),
             last_use: LastUse { opened: Instant::now(), at_ms: AtomicU64::new(0) },
-            is_shared: AtomicBool::default(),
         }
     }
 
-    /// Notes that other nodes share the map.
-    pub(crate) fn note_shared(&self) {
-        self.is_shared.store(true, Ordering::Release);
+    /// Which node makes its changes.
+    pub(crate) fn lead(&self) -> Lead {
+        self.commit_queue.lead().borrow().clone()
     }
 
     /// Refuses what would take a map that nodes share away from its log.
     pub(super) fn check_not_shared(&self) -> Result<(), ServiceError> {
-        if !self.is_shared.load(Ordering::Acquire) {
+        if !matches!(self.lead(), Lead::Shared { .. }) {
             return Ok(());
         }
         let message =
@@ -173,7 +170,7 @@ impl HostedMap {
     /// True where the map is at `revision`, no other node shares it, and nobody but its worker uses its files.
     pub(super) fn may_close(&self, revision: u64) -> bool {
         const OWN: usize = 2;
-        let is_at_rest = self.map.revision() == revision && !self.is_shared.load(Ordering::Acquire);
+        let is_at_rest = self.map.revision() == revision && self.lead() == Lead::Alone;
         is_at_rest && self.folder.as_ref().is_some_and(|it| Arc::strong_count(it) == OWN)
     }
 

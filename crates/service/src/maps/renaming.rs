@@ -43,7 +43,7 @@ impl Catalog {
             let renamed = Arc::new(old.renamed(&threads, to.clone(), &settings));
             let mut maps = catalog.maps.write();
             maps.open.remove(&old.name);
-            maps.open.insert(to.clone(), Arc::clone(&renamed));
+            catalog.serve(&mut maps, &renamed);
             drop(maps);
             tracing::info!(map = %old.name, %to, "renamed");
             unsynced.map_or(Ok(renamed), |error| {

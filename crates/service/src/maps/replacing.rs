@@ -19,7 +19,10 @@ impl Catalog {
         uuid: Uuid,
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
-        old.check_not_shared()?;
+        // A newer copy of the same map may take the place of this node's.
+        if uuid != old.uuid {
+            old.check_not_shared()?;
+        }
         let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
         let threads = Arc::clone(&self.commit_threads);
         let taken: Vec<MapName> = self.maps.read().taken().cloned().collect();
@@ -54,8 +57,8 @@ impl Catalog {
         });
         let (there, kept, error): (Arc<HostedMap>, Arc<HostedMap>, Option<ServiceError>) = exchanged.await?;
         let mut maps = self.maps.write();
-        maps.open.insert(kept.name.clone(), Arc::clone(&kept));
-        maps.open.insert(name.clone(), Arc::clone(&there));
+        self.serve(&mut maps, &kept);
+        self.serve(&mut maps, &there);
         drop(maps);
         if let Some(error) = error {
             return Err(error);

@@ -123,7 +123,7 @@ impl Catalog {
                     HostedMap::opened(&self.commit_threads, name.clone(), opened, robots, &self.settings);
                 let mut maps = self.maps.write();
                 maps.asleep.remove(name);
-                maps.open.insert(name.clone(), Arc::new(map));
+                self.serve(&mut maps, &Arc::new(map));
                 drop(maps);
                 if asleep.info.is_some() {
                     self.wakes.fetch_add(1, Ordering::Relaxed);

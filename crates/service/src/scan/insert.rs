@@ -27,7 +27,11 @@ impl MapService {
             self.scans.permit(&scan.robot)?;
             let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
             self.scans.permit_carving(&scan.robot, scan.carve, by_settings)?;
-            let (map, scan) = (self.map(map).await?, Arc::new(scan));
+            let map = self.map(map).await?;
+            if let Some((leader, cluster)) = self.leader_elsewhere(&map)? {
+                return cluster.forward.insert_scan(&leader, &self.on_behalf(), &map.name, scan).await;
+            }
+            let scan = Arc::new(scan);
             let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
             let judged = self.judge(&map, &scan).await;
             pending.end(&judged);

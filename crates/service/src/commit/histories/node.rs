@@ -7,6 +7,7 @@ use parking_lot::Mutex;
 use tokio::sync::{oneshot, watch};
 
 use super::changes::{MAP, name};
+use crate::commit::lead::Lead;
 use crate::commit::recent_changes::RecentChanges;
 use crate::commit::submission::{Outcome, SharedAct, Submission, Waiting};
 use crate::commit::worker::{Published, Worker};
@@ -56,8 +57,11 @@ impl Node {
         let opened = dir.map(&name(), &progress)?;
         let (map, folder) = (Arc::new(opened.map), Arc::new(opened.folder));
         let recent = Arc::new(RecentChanges::new(map.revision(), opened.history, 0));
-        let published =
-            Published { announced: watch::Sender::new(map.revision()), recent: Arc::clone(&recent) };
+        let published = Published {
+            announced: watch::Sender::new(map.revision()),
+            recent: Arc::clone(&recent),
+            lead: watch::Sender::new(Lead::Alone),
+        };
         let member = Member::join(Arc::new(NodeLog(Arc::clone(log))), self.name.clone(), MAP);
         let mut worker = Worker::new(
             name(),

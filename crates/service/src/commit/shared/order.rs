@@ -1,7 +1,8 @@
 //! Putting changes of this node into the log, where it leads.
 
 use super::own_history::OwnHistory;
-use crate::commit::stop::{no_quorum, not_acknowledged, not_kept, not_leader};
+use crate::commit::lead::Lead;
+use crate::commit::stop::{no_quorum, not_acknowledged, not_joined, not_kept, not_leader};
 use crate::commit::submission::Refusal;
 use crate::commit::worker::Worker;
 use crate::replication::NotOrdered;
@@ -12,6 +13,7 @@ impl Worker {
     pub(in crate::commit) fn check_leads(&self) -> Result<(), Refusal> {
         match &self.member {
             Some(member) if !member.leads() => Err(not_leader(&self.name, member.other_leader()).into()),
+            None if *self.published.lead.borrow() == Lead::NotJoined => Err(not_joined(&self.name).into()),
             _ => Ok(()),
         }
     }

@@ -1,0 +1,10 @@
+//! The other nodes of a cluster, as the operations of one of them see them: [`Forward`] asks the node that leads a map,
+//! [`SharedCatalog`] is the list of maps that all nodes share.
+
+mod forward;
+mod parts;
+mod shared_catalog;
+
+pub use forward::{Forward, OnBehalf};
+pub use parts::{Cluster, Later};
+pub use shared_catalog::SharedCatalog;
