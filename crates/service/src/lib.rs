@@ -11,8 +11,10 @@
 //! 4. `commit`: how changes of a map become durable, then visible, then acknowledged.
 //! 5. `maps`: the maps by name, and what a hosted map is made of.
 //! 6. `map_service`: [`MapService`], the handle of which every operation is a method.
-//! 7. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.
+//! 7. `at_the_leader`: an operation of which one node makes the changes, here or there.
+//! 8. `lifecycle`, `read`, `question`, `watch`, `scan`, `change`: the operations, by kind.
 
+mod at_the_leader;
 mod caller;
 mod change;
 mod cluster;
@@ -39,7 +41,7 @@ mod watch;
 mod work;
 
 pub use caller::{AllowedMaps, AllowedScans};
-pub use cluster::{Cluster, Forward, Later, OnBehalf, SharedCatalog};
+pub use cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, SharedCatalog};
 pub use commit::Lead;
 pub use error::{ErrorCode, Reason, ReportedBy, ServiceError};
 pub use lifecycle::SharedMap;

@@ -4,13 +4,11 @@
 use std::sync::Arc;
 
 use super::caller::{AllowedMaps, AllowedScans};
-use super::cluster::{Cluster, OnBehalf};
-use super::commit::{Lead, Refusal, Step, not_leader};
+use super::commit::{Refusal, Step};
 use super::error::{Reason, ServiceError};
 use super::limits::Limits;
 use super::maps::{Catalog, HostedMap};
 use super::observer::{Change, End, Ended, Outcome};
-use super::replication::NodeName;
 use super::resources::{Readings, ResourceBudget, Shortage};
 use super::settings::ServiceSettings;
 use super::work::{Asker, FreeThread, Lane, LaneUse, Lanes, Requester};
@@ -205,32 +203,6 @@ impl MapService {
     ) -> Result<Result<Committed, Refusal>, ServiceError> {
         let mut submitted = Submitted { service: self, operation, map, outcome };
         (&mut submitted.outcome).await.map_err(commit_thread_ended)
-    }
-
-    /// For whom this handle asks another node.
-    pub(super) fn on_behalf(&self) -> OnBehalf {
-        OnBehalf { caller: self.caller.clone() }
-    }
-
-    /// The node to be asked for a change of a map in the place of this one; none where this one makes it.
-    ///
-    /// # Errors
-    /// `NotLeader` where another node asked this one, and `NoQuorum` where none leads yet.
-    pub(super) fn leader_elsewhere(
-        &self,
-        map: &HostedMap,
-    ) -> Result<Option<(NodeName, &Cluster)>, ServiceError> {
-        let Some(cluster) = &self.inner.settings.cluster else { return Ok(None) };
-        match map.lead() {
-            Lead::Shared { leader: Some(leader), is_here: false, .. } if leader != cluster.node => {
-                match self.is_forwarded {
-                    true => Err(not_leader(&map.name, Some(&leader))),
-                    false => Ok(Some((leader, cluster))),
-                }
-            }
-            // The map's worker says why.
-            _ => Ok(None),
-        }
     }
 
     /// The map of that name, which is opened where it sleeps.

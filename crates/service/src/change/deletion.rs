@@ -39,26 +39,41 @@ impl MapService {
                 DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
                 DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => {}
             }
-            // The scans that touched each voxel since are read from the journal, as for an undo.
-            let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
-            let lane = if reads_journal { &self.inner.lanes.undo } else { &self.inner.lanes.mapping };
-            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
-            let (inner, deletion, caller) =
-                (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
-            let of = Arc::clone(&map);
-            let submit = move |stop: StopSignal<'_>| {
-                let submit = |stop: StopSignal<'_>| {
-                    map.prepare_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
-                };
-                if reads_journal { limit.run(stop, submit) } else { submit(stop) }
-            };
-            self.submit_and_wait(("DeleteVoxels", &of), (lane, &Requester::from(&self.asker)), None, submit)
-                .await
+            let deletion = Arc::new(deletion);
+            self.at_the_leader(
+                &map,
+                || self.delete_here(&map, &deletion),
+                |leader, call| {
+                    let deletion = Deletion::clone(&deletion);
+                    async move { leader.delete_voxels(&call, deletion).await }
+                },
+            )
+            .await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| {
             Outcome::Changed(observer::Change::of_deletion(answer))
         })
         .await
+    }
+
+    async fn delete_here(
+        &self,
+        map: &Arc<HostedMap>,
+        deletion: &Arc<Deletion>,
+    ) -> Result<DeletionAnswer, ServiceError> {
+        // The scans that touched each voxel since are read from the journal, as for an undo.
+        let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
+        let lane = if reads_journal { &self.inner.lanes.undo } else { &self.inner.lanes.mapping };
+        let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
+        let (of, inner) = (Arc::clone(map), Arc::clone(&self.inner));
+        let (deletion, caller) = (Arc::clone(deletion), self.caller.clone());
+        let submit = move |stop: StopSignal<'_>| {
+            let submit =
+                |stop: StopSignal<'_>| of.prepare_deletion(&deletion, caller.as_ref(), &inner.budget, stop);
+            if reads_journal { limit.run(stop, submit) } else { submit(stop) }
+        };
+        let requester = Requester::from(&self.asker);
+        self.submit_and_wait(("DeleteVoxels", map), (lane, &requester), None, submit).await
     }
 }
 

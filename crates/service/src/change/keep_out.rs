@@ -27,9 +27,20 @@ impl MapService {
     pub async fn put_keep_out(&self, map: &MapName, put: PutKeepOut) -> Result<KeepOutAnswer, ServiceError> {
         let work = async {
             self.limits().check_corners(put.shape.corners())?;
-            let PutKeepOut { name, shape, expires_at_ns, request_id } = put;
-            let act = KeepOutAct::Put { shape, made_by: self.caller.clone(), expires_at_ns };
-            self.change_keep_out(map, KeepOutChange { name, act }, request_id).await
+            let map = self.map(map).await?;
+            self.at_the_leader(
+                &map,
+                || {
+                    let PutKeepOut { name, shape, expires_at_ns, request_id } = put.clone();
+                    let act = KeepOutAct::Put { shape, made_by: self.caller.clone(), expires_at_ns };
+                    self.change_keep_out(&map, KeepOutChange { name, act }, request_id)
+                },
+                |leader, call| {
+                    let put = put.clone();
+                    async move { leader.put_keep_out(&call, put).await }
+                },
+            )
+            .await
         };
         self.observed("PutKeepOut", Some(map), work, |answer| Outcome::Changed(Change::of_keep_out(answer)))
             .await
@@ -42,10 +53,24 @@ impl MapService {
     pub async fn delete_keep_out(
         &self,
         map: &MapName,
-        DeleteKeepOut { name, request_id }: DeleteKeepOut,
+        deletion: DeleteKeepOut,
     ) -> Result<KeepOutAnswer, ServiceError> {
-        let act = KeepOutAct::Removed { by: self.caller.clone() };
-        let work = self.change_keep_out(map, KeepOutChange { name, act }, request_id);
+        let work = async {
+            let map = self.map(map).await?;
+            self.at_the_leader(
+                &map,
+                || {
+                    let DeleteKeepOut { name, request_id } = deletion.clone();
+                    let act = KeepOutAct::Removed { by: self.caller.clone() };
+                    self.change_keep_out(&map, KeepOutChange { name, act }, request_id)
+                },
+                |leader, call| {
+                    let deletion = deletion.clone();
+                    async move { leader.delete_keep_out(&call, deletion).await }
+                },
+            )
+            .await
+        };
         self.observed("DeleteKeepOut", Some(map), work, |answer| {
             Outcome::Changed(Change::of_keep_out(answer))
         })
@@ -66,20 +91,19 @@ impl MapService {
 
     async fn change_keep_out(
         &self,
-        map: &MapName,
+        map: &Arc<HostedMap>,
         change: KeepOutChange,
         request_id: Option<RequestId>,
     ) -> Result<KeepOutAnswer, ServiceError> {
-        let map = self.map(map).await?;
         let request =
             request_id.map(|id| Request { id, digest: digest(&change), caller: self.caller.clone() });
         let (inner, record) = (Arc::clone(&self.inner), KeepOutRecord { change, request });
-        let of = Arc::clone(&map);
+        let of = Arc::clone(map);
         let submit = move |_: StopSignal<'_>| {
-            map.prepare_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
+            of.prepare_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
         };
         let lane = (&self.inner.lanes.mapping, &Requester::from(&self.asker));
-        self.submit_and_wait(("ChangeKeepOut", &of), lane, None, submit).await
+        self.submit_and_wait(("ChangeKeepOut", map), lane, None, submit).await
     }
 }
 

@@ -69,25 +69,37 @@ impl MapService {
         let work = async {
             self.scans.permit_undo(&undo.target)?;
             let (map, undo) = (self.map(map).await?, Arc::new(undo));
-            let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
-            let names_robots = self.scans.may_know_all_robots();
-            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
-            // Until its outcome is known: what was withdrawn before it is then what it found.
-            let (lane, requester) = (&self.inner.lanes.undo, Requester::from(&self.asker));
-            let _undo = lane.once_free(&self.asker, map.lock_undo()).await?;
-            // A thread first: the robot's scans wait for this undo, and not for those of other maps.
-            let thread = lane.thread(&requester).await?;
-            let _robot = map.lock_robot_of(&undo.target).await;
-            let of = Arc::clone(&map);
-            self.submit_and_wait(("Undo", &of), (lane, &requester), Some(thread), move |stop| {
-                limit.run(stop, |stop| {
-                    map.prepare_undo(&undo, caller.as_ref(), names_robots, &inner.budget, &limit, stop)
-                })
-            })
+            self.at_the_leader(
+                &map,
+                || self.undo_here(&map, &undo),
+                |leader, call| {
+                    let undo = Undo::clone(&undo);
+                    async move { leader.undo(&call, undo).await }
+                },
+            )
             .await
         };
         self.observed("Undo", Some(map), work, |answer| Outcome::Changed(observer::Change::of_undo(answer)))
             .await
+    }
+
+    async fn undo_here(&self, map: &Arc<HostedMap>, undo: &Arc<Undo>) -> Result<UndoAnswer, ServiceError> {
+        let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
+        // Until its outcome is known: what was withdrawn before it is then what it found.
+        let (lane, requester) = (&self.inner.lanes.undo, Requester::from(&self.asker));
+        let _undo = lane.once_free(&self.asker, map.lock_undo()).await?;
+        // A thread first: the robot's scans wait for this undo, and not for those of other maps.
+        let thread = lane.thread(&requester).await?;
+        let _robot = map.lock_robot_of(&undo.target).await;
+        let (of, undo) = (Arc::clone(map), Arc::clone(undo));
+        let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
+        let names_robots = self.scans.may_know_all_robots();
+        self.submit_and_wait(("Undo", map), (lane, &requester), Some(thread), move |stop| {
+            limit.run(stop, |stop| {
+                of.prepare_undo(&undo, caller.as_ref(), names_robots, &inner.budget, &limit, stop)
+            })
+        })
+        .await
     }
 }
 

@@ -5,6 +5,6 @@ mod forward;
 mod parts;
 mod shared_catalog;
 
-pub use forward::{Forward, OnBehalf};
+pub use forward::{Forward, ForwardedCall, ForwardedEvents};
 pub use parts::{Cluster, Later};
 pub use shared_catalog::SharedCatalog;

@@ -13,9 +13,13 @@ use crate::maps::{HostedMap, RATE_SAMPLES, Saving, maps_at_once};
 use crate::observer::{Change, Outcome};
 use crate::request::{MapFile, MapInfo, MapsAwake, UnavailableMap};
 use mrol_map::map::{MapName, MapSettings};
+use mrol_map::mapping::Sighting;
 use mrol_map::sync::polled_by_runtime;
 use mrol_map::util::StopSignal;
 use mrol_store::Opened;
+
+/// How long the description of a map waits for another node's sightings of robots.
+const SIGHTINGS_WAIT_MAX: Duration = Duration::from_secs(2);
 
 impl MapService {
     /// Makes a map; true when it was not there. The same settings again are fine.
@@ -52,14 +56,15 @@ impl MapService {
         .await
     }
 
-    /// Describes a map, with the last sighting of each robot.
+    /// Describes a map, with the last sighting of each robot. Where another node leads, that one has seen the robots: if
+    /// it does not answer, none are told.
     ///
     /// # Errors
     /// `NotFound` without such a map.
     pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
         let work = async {
             let map = self.map(name).await?;
-            let sightings = map.robots.sightings.to_vec();
+            let sightings = self.sightings_of(&map).await;
             Ok(MapInfo { sightings, ..self.describe(map).await? })
         };
         self.observed("GetMap", Some(name), work, |_| Outcome::Read).await
@@ -273,6 +278,12 @@ impl MapService {
         let inner = Arc::clone(&self.inner);
         let needs = move |map: &HostedMap| map.needs_saving(which);
         self.inner.catalog.save(at_once, needs, move |map| map.save(which, &inner.budget)).await
+    }
+
+    async fn sightings_of(&self, map: &HostedMap) -> Vec<Sighting> {
+        let Some((leader, call)) = self.leader_elsewhere(map) else { return map.robots.sightings.to_vec() };
+        let asked = tokio::time::timeout(SIGHTINGS_WAIT_MAX, leader.sightings(&call)).await;
+        asked.ok().and_then(Result::ok).unwrap_or_default()
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

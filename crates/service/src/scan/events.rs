@@ -4,18 +4,15 @@
 //! what is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use tokio::sync::watch;
-use tokio_stream::Stream;
-
+use super::event_watch::EventWatch;
 use super::submit::Judged;
-use crate::error::ServiceError;
+use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::maps::HostedMap;
 use crate::observer::Outcome;
-use crate::request::{EventMessage, EventsQuery, FailedScan, ScanAnswer, ScanEvent, ScanRequest};
-use crate::watch::{Teller, stream_of};
+use crate::request::{EventsQuery, FailedScan, ScanAnswer, ScanEvent, ScanRequest};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::MapName;
 
@@ -32,7 +29,18 @@ impl MapService {
         map: &MapName,
         query: EventsQuery,
     ) -> Result<Vec<Arc<ScanEvent>>, ServiceError> {
-        let work = async { Ok(self.map(map).await?.robots.events.list(&query)) };
+        let work = async {
+            let map = self.map(map).await?;
+            self.at_the_leader(
+                &map,
+                || std::future::ready(Ok(map.robots.events.list(&query))),
+                |leader, call| {
+                    let query = query.clone();
+                    async move { leader.list_events(&call, query).await }
+                },
+            )
+            .await
+        };
         self.observed("ListEvents", Some(map), work, |_| Outcome::Read).await
     }
 
@@ -43,70 +51,9 @@ impl MapService {
     pub async fn watch_events(&self, map: &MapName, query: EventsQuery) -> Result<EventWatch, ServiceError> {
         let work = async {
             let map = self.map(map).await?;
-            let limits = self.limits();
-            let heartbeat = Duration::from_secs_f64(limits.watch_heartbeat_s);
-            let unread_max_s = limits.watch_unread_max_s;
-            let (newest, waiting) = (map.robots.events.newest(), Vec::new().into_iter());
-            Ok(EventWatch { map, query, newest, waiting, heartbeat, is_greeted: false, unread_max_s })
+            EventWatch::begin(self.clone(), map, query).await
         };
         self.observed("WatchEvents", Some(map), work, |_| Outcome::Read).await
-    }
-}
-
-/// A watch of the events of a map. One that falls behind what is kept misses events, and is told of the next.
-#[derive(Debug)]
-pub struct EventWatch {
-    map: Arc<HostedMap>,
-    /// What comes next: those after the last that was told.
-    query: EventsQuery,
-    newest: watch::Receiver<u64>,
-    waiting: std::vec::IntoIter<Arc<ScanEvent>>,
-    heartbeat: Duration,
-    is_greeted: bool,
-    unread_max_s: f64,
-}
-
-impl EventWatch {
-    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled`
-    /// where the client took no message for `watch_unread_max_s`.
-    pub fn into_stream(
-        self,
-        end: impl Future<Output = ServiceError> + Send + 'static,
-    ) -> impl Stream<Item = Result<EventMessage, ServiceError>> + Send {
-        let unread_max_s = self.unread_max_s;
-        stream_of(self, unread_max_s, end)
-    }
-}
-
-impl Teller for EventWatch {
-    type Message = EventMessage;
-
-    /// The next event, or a heartbeat where none comes in a while: at once where there is none yet.
-    async fn tell(&mut self) -> Result<EventMessage, ServiceError> {
-        let patience = if self.is_greeted { self.heartbeat } else { Duration::ZERO };
-        // Events of other robots do not put it off.
-        let quiet_until = Instant::now() + patience;
-        loop {
-            if let Some(event) = self.waiting.next() {
-                self.query.since_number = event.number;
-                self.is_greeted = true;
-                return Ok(EventMessage::Event(event));
-            }
-            self.newest.borrow_and_update();
-            self.waiting = self.map.robots.events.list(&self.query).into_iter();
-            if self.waiting.len() > 0 {
-                continue;
-            }
-            tokio::select! {
-                biased;
-                () = self.map.commit_queue.ended() => return Err(self.map.ended()),
-                _ = self.newest.changed() => {}
-                () = tokio::time::sleep_until(quiet_until.into()) => {
-                    self.is_greeted = true;
-                    return Ok(EventMessage::Heartbeat);
-                }
-            }
-        }
     }
 }
 
@@ -130,6 +77,8 @@ impl<'a> PendingEvent<'a> {
             Ok(Judged { answer, guess, sample }) => {
                 self.note(*guess, sample.clone(), Ok(answer.clone().into()));
             }
+            // The node that makes it notes it.
+            Err(error) if error.reason == Reason::NotLeader => {}
             Err(error) => self.note(None, Vec::new(), Err(error.into())),
         }
         std::mem::forget(self);

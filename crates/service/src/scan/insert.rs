@@ -28,18 +28,16 @@ impl MapService {
             let by_settings = self.inner.settings.of_robot(&scan.robot).carve;
             self.scans.permit_carving(&scan.robot, scan.carve, by_settings)?;
             let map = self.map(map).await?;
-            if let Some((leader, cluster)) = self.leader_elsewhere(&map)? {
-                return cluster.forward.insert_scan(&leader, &self.on_behalf(), &map.name, scan).await;
-            }
             let scan = Arc::new(scan);
-            let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
-            let judged = self.judge(&map, &scan).await;
-            pending.end(&judged);
-            let Judged { answer, .. } = judged?;
-            if !answer.accepted {
-                self.search_for_robot_of(map, &scan);
-            }
-            Ok(answer)
+            self.at_the_leader(
+                &map,
+                || self.insert_here(&map, &scan),
+                |leader, call| {
+                    let scan = ScanRequest::clone(&scan);
+                    async move { leader.insert_scan(&call, scan).await }
+                },
+            )
+            .await
         };
         self.observed("InsertScan", Some(map), work, |answer| {
             Outcome::Scan(JudgedScan {
@@ -56,6 +54,21 @@ impl MapService {
             })
         })
         .await
+    }
+
+    async fn insert_here(
+        &self,
+        map: &Arc<HostedMap>,
+        scan: &Arc<ScanRequest>,
+    ) -> Result<ScanAnswer, ServiceError> {
+        let pending = PendingEvent::begin(map, scan, self.limits().events_per_map_max);
+        let judged = self.judge(map, scan).await;
+        pending.end(&judged);
+        let Judged { answer, .. } = judged?;
+        if !answer.accepted {
+            self.search_for_robot_of(Arc::clone(map), scan);
+        }
+        Ok(answer)
     }
 
     /// Aligns a scan and, where it fits, adds it: from its guess alone where that will do, or else as far as it takes.

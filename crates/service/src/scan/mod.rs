@@ -4,6 +4,7 @@
 //! (`filtered`), locates it (`mapper`) and sets it on its way into the map. Where it is refused, `recovery` searches
 //! for its robot.
 
+mod event_watch;
 mod events;
 mod filtered;
 mod insert;
@@ -13,7 +14,7 @@ mod recovery;
 mod submit;
 mod trajectory;
 
-pub use events::EventWatch;
+pub use event_watch::EventWatch;
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
     TIME_LIMIT_DEFAULT,
