@@ -314,7 +314,8 @@ mod tests {
     use super::*;
 
     fn refused(reason: &str) -> ClientError {
-        ClientError::Refused { code: Code::Unavailable, reason: Some(reason.into()), message: String::new() }
+        let (code, reason) = (Code::Unavailable, Some(reason.to_owned()));
+        ClientError::Refused { code, reason, message: String::new(), retry_after: None }
     }
 
     #[test]

@@ -12,28 +12,30 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{ConnectError, Response, Status, Streaming};
 
 use super::answers::Answers;
-use super::credentials::{Credentials, ShownKey};
+use super::credentials::{Credentials, Shown};
 use super::error::{ClientError, root_cause};
 use crate::wire::{pb, transport};
+use mrol_map::map::CallerName;
 use mrol_service::ServiceError;
+use mrol_service::replication::NodeName;
 use pb::mapping_client::MappingClient;
 use pb::maps_client::MapsClient;
 use pb::occupancy_client::OccupancyClient;
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A channel to a server, with the key that calls show and the address that error messages name.
+/// A channel to a server, with what calls show and the address that error messages name.
 #[derive(Debug, Clone)]
 pub(super) struct Connection {
     channel: Channel,
-    key: ShownKey,
+    shown: Shown,
     url: Arc<str>,
-    /// Of a client with several addresses: true once the server was found to be gone, or said that it goes.
+    /// Of one that is replaced when its server is gone: true once it was found to be, or said that it goes.
     is_gone: Option<Arc<AtomicBool>>,
 }
 
-/// A channel that adds the key to every call.
-type Keyed = InterceptedService<Channel, ShownKey>;
+/// A channel that adds to every call what it shows.
+type Keyed = InterceptedService<Channel, Shown>;
 
 impl Connection {
     pub(super) async fn open(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
@@ -48,8 +50,13 @@ impl Connection {
         Address::parse(url, credentials)?.connect(credentials, timeout).await
     }
 
-    /// The same connection, as one of a client that has other addresses too.
-    pub(super) fn among_others(self) -> Self {
+    /// The same connection, for calls that the node `node` forwards for a caller of its own.
+    pub(super) fn forwarding(self, node: &NodeName, caller: Option<&CallerName>) -> Self {
+        Self { shown: self.shown.forwarded(node, caller), ..self }
+    }
+
+    /// The same connection, for who replaces it once the server is gone, by one to another address or by a new one.
+    pub(super) fn replaceable(self) -> Self {
         Self { is_gone: Some(Arc::default()), ..self }
     }
 
@@ -58,7 +65,7 @@ impl Connection {
         self.is_gone.as_ref().is_some_and(|gone| gone.load(Ordering::Relaxed))
     }
 
-    /// Lets later calls use another address.
+    /// Lets later calls use another connection.
     pub(super) fn give_up(&self) {
         if let Some(gone) = &self.is_gone {
             gone.store(true, Ordering::Relaxed);
@@ -70,21 +77,21 @@ impl Connection {
     }
 
     pub(super) fn occupancy(&self) -> OccupancyClient<Keyed> {
-        OccupancyClient::with_interceptor(self.channel(), self.key.clone())
+        OccupancyClient::with_interceptor(self.channel(), self.shown.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
     pub(super) fn mapping(&self) -> MappingClient<Keyed> {
-        MappingClient::with_interceptor(self.channel(), self.key.clone())
+        MappingClient::with_interceptor(self.channel(), self.shown.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
     pub(super) fn maps(&self) -> MapsClient<Keyed> {
-        MapsClient::with_interceptor(self.channel(), self.key.clone())
+        MapsClient::with_interceptor(self.channel(), self.shown.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
-    /// The error that a status is. Where there are other addresses, one that never was sent is told from one that was.
+    /// The error that a status is. Where the connection is replaced, a call that was never sent is told from one that was.
     pub(super) fn failure(&self, status: &Status) -> ClientError {
         let error = ClientError::of(&self.url, status);
         if self.is_gone.is_none() || !matches!(error, ClientError::Lost { .. }) {
@@ -142,6 +149,12 @@ impl Address {
         Ok(Self { url, endpoint })
     }
 
+    /// The same, where a peer that is gone is found out within `interval` and `timeout`.
+    pub(super) fn with_keepalive(self, interval: Duration, timeout: Duration) -> Self {
+        let endpoint = self.endpoint.http2_keep_alive_interval(interval).keep_alive_timeout(timeout);
+        Self { endpoint, ..self }
+    }
+
     /// A channel that connects when it is used. It must be called in a runtime.
     pub(super) fn lazy_channel(&self) -> Channel {
         self.endpoint.connect_lazy()
@@ -160,7 +173,7 @@ impl Address {
         let connecting = self.endpoint.clone().connect_timeout(timeout);
         match tokio::time::timeout(timeout, connecting.connect()).await {
             Ok(Ok(channel)) => {
-                Ok(Connection { channel, key: credentials.key(), url: url.into(), is_gone: None })
+                Ok(Connection { channel, shown: credentials.shown(), url: url.into(), is_gone: None })
             }
             Ok(Err(error)) if !is_timeout(&error) => Err(ClientError::unreachable(url, &error)),
             Ok(Err(_)) | Err(_) => {

@@ -8,19 +8,28 @@ use tonic::transport::{Certificate, ClientTlsConfig, Identity};
 use tonic::{Request, Status};
 
 use super::error::ClientError;
+use crate::wire::{CALLER, NODE};
+use mrol_map::map::CallerName;
+use mrol_service::replication::NodeName;
 
 /// Credentials of a client: the key and certificate that it shows, and the certificate authorities that it trusts. By
 /// default it shows nothing and trusts those of the system.
 #[derive(Clone, Default)]
 pub struct Credentials {
-    key: ShownKey,
+    shown: Shown,
     server_ca: Option<Certificate>,
     identity: Option<Identity>,
 }
 
-/// The key that is sent with every call.
+/// What is sent with every call.
 #[derive(Clone, Default)]
-pub(super) struct ShownKey(Option<MetadataValue<Ascii>>);
+pub(super) struct Shown {
+    key: Option<MetadataValue<Ascii>>,
+    /// The node that forwards the calls of its own callers.
+    node: Option<MetadataValue<Ascii>>,
+    /// The caller whose calls it forwards.
+    caller: Option<MetadataValue<Ascii>>,
+}
 
 impl Credentials {
     /// Sends the secret of a key with every call.
@@ -37,7 +46,7 @@ impl Credentials {
             return Err(ClientError::Credentials(problem.into()));
         };
         key.set_sensitive(true);
-        Ok(Self { key: ShownKey(Some(key)), ..self })
+        Ok(Self { shown: Shown { key: Some(key), ..self.shown }, ..self })
     }
 
     /// Trusts only servers whose certificate is signed by one of these (PEM).
@@ -59,8 +68,8 @@ impl Credentials {
         Ok(Self { identity: Some(Identity::from_pem(certificate, key)), ..self })
     }
 
-    pub(super) fn key(&self) -> ShownKey {
-        self.key.clone()
+    pub(super) fn shown(&self) -> Shown {
+        self.shown.clone()
     }
 
     /// True when the credentials are of use only with TLS.
@@ -80,18 +89,37 @@ impl Credentials {
     }
 }
 
-impl Interceptor for ShownKey {
+impl Shown {
+    /// The same, of calls that the node `node` forwards for a caller of its own: the holder of a key, or anybody.
+    pub(super) fn forwarded(self, node: &NodeName, caller: Option<&CallerName>) -> Self {
+        // Their letters are those of a header.
+        let value = |name: &str| MetadataValue::try_from(name).ok();
+        let caller = caller.and_then(|caller| value(caller.as_str()));
+        Self { node: value(node.as_str()), caller, ..self }
+    }
+}
+
+impl Interceptor for Shown {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
-        if let Some(key) = &self.0 {
-            request.metadata_mut().insert("authorization", key.clone());
+        let Self { key, node, caller } = self;
+        for (name, value) in [("authorization", key), (NODE, node), (CALLER, caller)] {
+            if let Some(value) = value {
+                request.metadata_mut().insert(name, value.clone());
+            }
         }
         Ok(request)
     }
 }
 
-impl fmt::Debug for ShownKey {
+impl fmt::Debug for Shown {
+    /// Says whether there is a key, without its value.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.0.is_some() { "ShownKey(..)" } else { "ShownKey(none)" })
+        let Self { key, node, caller } = self;
+        f.debug_struct("Shown")
+            .field("key", &key.is_some())
+            .field("node", node)
+            .field("caller", caller)
+            .finish()
     }
 }
 
@@ -99,7 +127,7 @@ impl fmt::Debug for Credentials {
     /// Says which credentials are set, without their values.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Credentials")
-            .field("key", &self.key.0.is_some())
+            .field("key", &self.shown.key.is_some())
             .field("server_ca", &self.server_ca.is_some())
             .field("identity", &self.identity.is_some())
             .finish()
@@ -122,8 +150,8 @@ mod tests {
     #[test]
     fn a_key_is_shown_to_the_server_and_to_nobody_else() {
         let credentials = Credentials::default().with_key(" mrol_1\n").unwrap();
-        assert!(!format!("{credentials:?} {:?}", credentials.key()).contains("mrol_1"));
-        let request = credentials.key().call(Request::new(())).unwrap();
+        assert!(!format!("{credentials:?} {:?}", credentials.shown()).contains("mrol_1"));
+        let request = credentials.shown().call(Request::new(())).unwrap();
         assert_eq!(request.metadata().get("authorization").unwrap(), "Bearer mrol_1");
         assert!(!format!("{request:?}").contains("mrol_1"));
     }

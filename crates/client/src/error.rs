@@ -1,10 +1,11 @@
 //! Errors of the client.
 
 use std::error::Error;
+use std::time::Duration;
 
 use tonic::{Code, Status};
 
-use crate::wire::{REASON, pb};
+use crate::wire::{REASON, pb, retry_after};
 use mrol_service::ServiceError;
 
 /// Start of the TLS error for a server's certificate.
@@ -75,6 +76,8 @@ pub enum ClientError {
         reason: Option<String>,
         /// Message of the failure, for people.
         message: String,
+        /// When the same call may be answered otherwise, where the server tells.
+        retry_after: Option<Duration>,
     },
     /// The server's answer is not valid for this version of the client.
     #[error("the server's answer cannot be understood: {0}")]
@@ -118,16 +121,18 @@ impl ClientError {
                 Self::Foreign { url: url.to_owned(), cause: cause.to_owned() }
             }
             (reason, code) => {
-                Self::Refused { code, reason: reason.map(str::to_owned), message: message.to_owned() }
+                let (reason, message) = (reason.map(str::to_owned), message.to_owned());
+                Self::Refused { code, reason, message, retry_after: retry_after(status) }
             }
         }
     }
 }
 
 impl From<pb::Failure> for ClientError {
-    fn from(pb::Failure { code, reason, message, .. }: pb::Failure) -> Self {
+    fn from(pb::Failure { code, reason, message, retry_after_s }: pb::Failure) -> Self {
         let reason = Some(reason).filter(|reason| !reason.is_empty());
-        Self::Refused { code: Code::from_i32(code), reason, message }
+        let retry_after = retry_after_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+        Self::Refused { code: Code::from_i32(code), reason, message, retry_after }
     }
 }
 
@@ -147,6 +152,7 @@ pub(super) fn root_cause(error: &dyn Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::status_of;
 
     #[test]
     fn a_refusal_keeps_the_servers_message_and_word() {
@@ -155,6 +161,19 @@ mod tests {
         let error = ClientError::of("http://a", &status);
         assert_eq!(error.reason(), Some("map_not_found"));
         assert_eq!(error.to_string(), "map a does not exist (map_not_found)");
+    }
+
+    #[test]
+    fn a_refusal_keeps_when_to_come_again() {
+        let wait = Duration::from_millis(1500);
+        let refusal = ServiceError::overloaded("too much").retry_after(wait);
+        let told = |error| match error {
+            ClientError::Refused { retry_after, .. } => retry_after,
+            other => panic!("{other}"),
+        };
+        assert_eq!(told(ClientError::of("http://a", &status_of(refusal.clone()))), Some(wait));
+        assert_eq!(told(pb::Failure::from(refusal).into()), Some(wait));
+        assert_eq!(told(ClientError::of("http://a", &Status::not_found("no"))), None);
     }
 
     #[test]

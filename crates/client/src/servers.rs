@@ -186,7 +186,7 @@ impl Several {
         let timeout =
             share.map_or(CONNECT_TIMEOUT, |share| share.clamp(CONNECT_TIMEOUT_MIN, CONNECT_TIMEOUT));
         match self.addresses[place].connect(&self.credentials, timeout).await {
-            Ok(connection) => Some(connection.among_others()),
+            Ok(connection) => Some(connection.replaceable()),
             Err(error) => {
                 self.used.lock().leave(place);
                 tried.note(error);

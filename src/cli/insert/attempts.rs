@@ -84,6 +84,7 @@ mod tests {
             code,
             reason: reason.map(str::to_owned),
             message: String::new(),
+            retry_after: None,
         };
         assert!(is_passing(&refused(Code::Unavailable, Some("draining"))));
         assert!(is_passing(&refused(Code::Unavailable, None)));

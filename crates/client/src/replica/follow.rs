@@ -181,8 +181,10 @@ mod tests {
 
     #[test]
     fn a_key_that_is_refused_is_told_from_a_server_that_is_away() {
-        let refused =
-            |code| refuses_key(&ClientError::Refused { code, reason: None, message: String::new() });
+        let refused = |code| {
+            let (reason, message, retry_after) = (None, String::new(), None);
+            refuses_key(&ClientError::Refused { code, reason, message, retry_after })
+        };
         assert!(refused(Code::Unauthenticated) && refused(Code::PermissionDenied));
         assert!(![Code::Unavailable, Code::NotFound, Code::ResourceExhausted].into_iter().any(refused));
         assert!(!refuses_key(&ClientError::Lost { url: String::new(), cause: String::new() }));

@@ -1,5 +1,7 @@
 //! Failures as messages and as status, and their codes.
 
+use std::time::Duration;
+
 use tonic::metadata::MetadataValue;
 use tonic::{Code, Status};
 
@@ -36,6 +38,12 @@ pub fn status_of(error: ServiceError) -> Status {
         status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
     }
     status
+}
+
+/// When a status says that the same call may be answered otherwise.
+pub fn retry_after(status: &Status) -> Option<Duration> {
+    let wait = status.metadata().get(PUSHBACK)?.to_str().ok()?;
+    wait.parse().ok().map(Duration::from_millis)
 }
 
 /// A failure as an answer of a stream.

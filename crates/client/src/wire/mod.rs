@@ -10,6 +10,7 @@ pub mod codec;
 mod deletion;
 mod events;
 mod failure;
+mod forwarded;
 mod keep_out;
 mod localization;
 mod map_file;
@@ -26,7 +27,8 @@ mod values;
 mod watch;
 
 pub use codec::{IGNORED_MAX, LINKS_MAX};
-pub use failure::{REASON, status_code, status_of};
+pub use failure::{REASON, retry_after, status_code, status_of};
+pub use forwarded::{CALLER, NODE};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::{create_map, nanoseconds};
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
