@@ -50,7 +50,7 @@ fn planners_compile_no_server() {
 
 #[test]
 fn what_nodes_share_is_kept_without_a_server() {
-    let server = ["mrol", "mrol-client", "axum", "clap", "tonic", "utoipa", "figment", "metrics"];
+    let server = ["mrol", "axum", "clap", "utoipa", "figment", "metrics", "tonic-health", "tonic-reflection"];
     check_without("mrol-cluster", &server);
 }
 

@@ -8,6 +8,7 @@
 //! 4. `bases`: map files that stand for what is cut from the front of a log.
 //! 5. `jetstream_log`: the log of a map, which is a stream.
 //! 6. `following`: what makes a node's copy of a map follow its log.
+//! 7. `forwarder`: what takes changes on to the node that leads.
 
 mod bases;
 mod beat;
@@ -15,6 +16,7 @@ mod beats;
 mod bucket;
 mod engine;
 mod following;
+mod forwarder;
 mod jetstream_log;
 mod liveness;
 
@@ -24,5 +26,6 @@ pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
 pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError};
 pub use following::Following;
+pub use forwarder::{Forwarder, ForwarderError, ForwarderSettings, NodeCertificate};
 pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
 pub use liveness::Liveness;

@@ -1,0 +1,80 @@
+//! What the caller is told of a call to another node that failed.
+
+use std::time::Duration;
+
+use mrol_client::ClientError;
+use mrol_service::replication::NodeName;
+use mrol_service::{Reason, ServiceError};
+
+/// When to ask again where a node does not answer: another takes over after some seconds.
+const NODE_SOON: Duration = Duration::from_secs(2);
+
+/// What was asked of another node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// Something that changes the map: once it was sent, it may be made.
+    Change,
+    /// Something that changes nothing.
+    Question,
+}
+
+/// What the caller is told of a call to `node` that failed: what that node said, in its words, where it said something.
+pub(super) fn error_of(node: &NodeName, asked: Asked, error: ClientError) -> ServiceError {
+    match error {
+        ClientError::Refused { reason, message, retry_after, .. } => {
+            let reason = reason.as_deref().and_then(Reason::of_word);
+            match (reason, asked) {
+                // It went on without whoever waits for it.
+                (Some(Reason::Deadline | Reason::CallerGone) | None, Asked::Change) => {
+                    unknown(node, &message)
+                }
+                (Some(reason), _) => ServiceError { reason, message, retry_after },
+                (None, Asked::Question) => unanswered(node, &message),
+            }
+        }
+        // It was never sent.
+        ClientError::Url { .. }
+        | ClientError::Credentials(_)
+        | ClientError::Unreachable { .. }
+        | ClientError::Untrusted { .. } => unanswered(node, &cause_of(&error)),
+        ClientError::Lost { .. } | ClientError::Foreign { .. } | ClientError::Answer(_) => match asked {
+            Asked::Change => unknown(node, &cause_of(&error)),
+            Asked::Question => unanswered(node, &cause_of(&error)),
+        },
+    }
+}
+
+/// What the caller is told where nobody knows yet where `node` is.
+pub(super) fn no_address(node: &NodeName) -> ServiceError {
+    unanswered(node, "its address is not known here")
+}
+
+/// What the caller is told where `node` does not begin to answer.
+pub(super) fn not_opened(node: &NodeName) -> ServiceError {
+    unanswered(node, "it began no answer in time")
+}
+
+fn unanswered(node: &NodeName, cause: &str) -> ServiceError {
+    let message = format!("node {node} does not answer ({cause}): nothing was changed, try again");
+    ServiceError::new(Reason::NoQuorum, message).retry_after(NODE_SOON)
+}
+
+fn unknown(node: &NodeName, cause: &str) -> ServiceError {
+    let message = format!(
+        "this change was sent to node {node}, which did not answer ({cause}): it may be there, now or later; the same scan_id or \
+         request_id, sent again, tells"
+    );
+    ServiceError::new(Reason::OutcomeUnknown, message).retry_after(NODE_SOON)
+}
+
+/// The cause, without what is said to people at a terminal.
+fn cause_of(error: &ClientError) -> String {
+    match error {
+        ClientError::Unreachable { cause, .. }
+        | ClientError::Untrusted { cause, .. }
+        | ClientError::Lost { cause, .. }
+        | ClientError::Foreign { cause, .. }
+        | ClientError::Url { problem: cause, .. } => cause.clone(),
+        error => error.to_string(),
+    }
+}
