@@ -4,6 +4,7 @@ use axum::http::header::AUTHORIZATION;
 use axum::http::{Extensions, HeaderMap, Request};
 
 use super::caller::Caller;
+use super::forwarding::Forwarding;
 use super::operation::Operation;
 use super::peer::{Peer, asker_of};
 use super::rules::Access;
@@ -47,7 +48,8 @@ impl Gate {
         Self { access, service }
     }
 
-    /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it.
+    /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it; and what it says
+    /// of the node that forwards it, which counts for the secret of the cluster alone. No page of a browser shows that.
     ///
     /// # Errors
     /// `Unauthenticated` and `PermissionDenied`, as [`Access::authorize`] and [`Access::check_site`] say.
@@ -57,12 +59,22 @@ impl Gate {
         request: &mut Request<B>,
     ) -> Result<Authorized, ServiceError> {
         let secret = taken_from(request.headers_mut());
-        self.access.check_site(operation, request)?;
-        let caller = self.access.authorize(operation, secret.as_ref())?;
+        let forwarding = Forwarding::taken_from(request.headers_mut());
+        let is_of_node = self.access.is_of_cluster(secret.as_ref());
+        let caller = if is_of_node {
+            let over_grpc = operation.grpc() == Some(request.uri().path());
+            self.access.authorize_forwarded(operation, over_grpc, &forwarding)?
+        } else {
+            self.access.check_site(operation, request)?;
+            self.access.authorize(operation, secret.as_ref())?
+        };
         let name = caller.name().map(CallerName::new).transpose()?;
         let asker = asker_of(caller.name(), request.extensions().get::<Peer>());
         let service = self.service.limited_to(name, caller.allowed_maps().clone(), caller.scans());
         let service = service.asked_by(asker);
+        // Where nobody shows anything nodes do not either. That it is taken no further gains nobody anything.
+        let is_forwarded = is_of_node || (forwarding.node.is_some() && self.access.asks_for_nothing());
+        let service = if is_forwarded { service.forwarded() } else { service };
         Ok(Authorized { caller, service })
     }
 

@@ -49,6 +49,13 @@ impl Keys {
         self.0.get(place as usize).cloned()
     }
 
+    /// The key of a name: while one is being rotated, the one of its two that counts longer.
+    pub(super) fn named(&self, name: &KeyName) -> Option<Arc<Key>> {
+        let of_name = self.0.iter().filter(|key| key.name == *name);
+        // One without an end counts for ever.
+        of_name.max_by_key(|key| (key.expires.is_none(), key.expires)).cloned()
+    }
+
     /// Ends what was begun with keys whose time is up at `now`; to be called every second or so.
     pub(super) fn end_expired(&self, now: SystemTime) {
         let expired = self.0.iter().filter(|key| key.is_expired(now));
@@ -100,6 +107,24 @@ mod tests {
         let found = |secret| keys.find(&Secret::new(secret)).map(|key| key.name.to_string());
         assert_eq!((found("1").as_deref(), found("2").as_deref()), (Some("a"), Some("b")));
         assert_eq!((found("3"), found("")), (None, None));
+    }
+
+    #[test]
+    fn of_the_two_secrets_of_a_key_its_name_stands_for_the_one_that_counts_longer() {
+        let [soon, late] = ["2027-01-31", "2028-01-31"].map(|text| Expiry::parse(text).unwrap());
+        let found = |keys: Vec<Key>| {
+            let keys = Keys::after(None, keys);
+            keys.named(&KeyName::new("a").unwrap()).unwrap().expires
+        };
+        let a = || key("a", "1", Scope::Read);
+        let former = |end| a().former(Secret::new("0").digest(), Some(end));
+        assert_eq!(found(vec![former(soon), a()]), None);
+        assert_eq!(found(vec![a(), former(soon)]), None);
+        assert_eq!(
+            found(vec![a().until(late), a().until(late).former(Secret::new("0").digest(), Some(soon))]),
+            Some(late)
+        );
+        assert!(Keys::after(None, vec![a()]).named(&KeyName::new("b").unwrap()).is_none());
     }
 
     #[test]

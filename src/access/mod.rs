@@ -3,10 +3,15 @@
 //! A request passes two checks. [`Gate::authorize`] asks, before anything of its body is read, whether the caller's key
 //! is for the operation, and whether a page of another site may be behind it; the service that it hands out then
 //! refuses every map and every robot that the key is not for.
+//!
+//! A node of a cluster asks for its own callers: it shows the secret of the cluster, and names the key of each. It gets
+//! what the holder of that key would, and no more.
 
 mod allowance;
 mod caller;
+mod cluster_secret;
 mod expiry;
+mod forwarding;
 mod gate;
 mod key;
 mod key_file;
@@ -21,6 +26,7 @@ mod site;
 
 pub use self::allowance::{Allowance, InWork, KeyLimits};
 pub use self::caller::Caller;
+pub use self::cluster_secret::{ClusterSecretError, read_cluster_secret};
 pub use self::expiry::Expiry;
 pub use self::gate::{Authorized, Gate};
 pub use self::key::{Key, KeyName};

@@ -126,6 +126,21 @@ impl Operation {
         self.scope().is_some_and(|scope| scope > Read)
     }
 
+    /// True for what a node of a cluster asks of the one that leads, for callers of its own.
+    pub fn is_asked_by_nodes(self) -> bool {
+        matches!(
+            self,
+            Self::InsertScan
+                | Self::DeleteVoxels
+                | Self::Undo
+                | Self::PutKeepOut
+                | Self::DeleteKeepOut
+                | Self::ListEvents
+                | Self::WatchEvents
+                | Self::GetMap
+        )
+    }
+
     /// The path of the gRPC call.
     pub fn grpc(self) -> Option<&'static str> {
         self.row().grpc

@@ -8,13 +8,14 @@ use axum::http::Request;
 
 use super::caller::Caller;
 use super::expiry::Expiry;
+use super::forwarding::{ForwardedCaller, Forwarding};
 use super::key::{Key, KeyName};
 use super::key_file::KeyFileError;
 use super::keys::Keys;
 use super::operation::Operation;
 use super::reload::ReloadableFile;
 use super::scope::Scope;
-use super::secret::Secret;
+use super::secret::{Digest, Secret};
 use super::site::{Hosts, check_origin};
 use mrol_service::{AllowedMaps, Reason, ServiceError};
 
@@ -27,12 +28,14 @@ pub struct Access {
     metrics_open: bool,
     /// The names that it answers to where there are no keys.
     hosts: Hosts,
+    /// What nodes of the same cluster show that ask for their callers.
+    cluster_secret: Option<Digest>,
 }
 
 impl Access {
     /// Anybody who can connect may do anything.
     pub fn open() -> Self {
-        Self { keys: None, metrics_open: true, hosts: Hosts::default() }
+        Self { keys: None, metrics_open: true, hosts: Hosts::default(), cluster_secret: None }
     }
 
     /// This access, which without keys answers requests to these host names too.
@@ -47,7 +50,12 @@ impl Access {
     pub fn by_keys_of(file: &Path, metrics_open: bool) -> Result<Self, KeyFileError> {
         let path: PathBuf = file.to_owned();
         let keys = ReloadableFile::new(vec![path.clone()], move |former| Keys::read(&path, former))?;
-        Ok(Self { keys: Some(Arc::new(keys)), metrics_open, hosts: Hosts::default() })
+        Ok(Self { keys: Some(Arc::new(keys)), metrics_open, ..Self::open() })
+    }
+
+    /// This access, where nodes of the same cluster, which show this secret, ask for callers of their own.
+    pub fn with_cluster_secret(self, secret: &Secret) -> Self {
+        Self { cluster_secret: Some(secret.digest()), ..self }
     }
 
     /// The keys, where there are any.
@@ -108,13 +116,86 @@ impl Access {
             return Ok(key.map_or_else(|| Caller::without_key(AllowedMaps::none()), Caller::with));
         };
         let key = key.ok_or_else(|| no_key(operation, secret.is_some()))?;
-        if let Some(refusal) = key.expired(SystemTime::now()) {
-            return Err(refusal);
-        }
-        check_scope(operation, scope, &key)?;
-        check_metrics_allowed(operation, &key)?;
-        Ok(Caller::with(key))
+        let caller = holder(operation, scope, key)?;
+        check_metrics_allowed(operation, &caller)?;
+        Ok(caller)
     }
+
+    /// True of the secret of the cluster. How long it takes tells nothing of how near another is to it.
+    pub(super) fn is_of_cluster(&self, secret: Option<&Secret>) -> bool {
+        let (Some(secret), Some(own)) = (secret, &self.cluster_secret) else { return false };
+        own.same_as(&secret.digest()).into()
+    }
+
+    /// True where nobody shows anything, neither callers nor nodes.
+    pub(super) fn asks_for_nothing(&self) -> bool {
+        self.keys.is_none() && self.cluster_secret.is_none()
+    }
+
+    /// The caller for whom a node asks for `operation`, if the caller itself may: who shows the secret of the cluster is
+    /// believed for whom it asks, and may do nothing else. `over_grpc` is true of a gRPC call: nodes make no others.
+    ///
+    /// # Errors
+    /// `Unauthenticated` without the name of a node, or where the caller's key is needed and not known here, or its time
+    /// is up; `PermissionDenied` for what nodes do not ask, and where the key is for less.
+    pub(super) fn authorize_forwarded(
+        &self,
+        operation: Operation,
+        over_grpc: bool,
+        forwarding: &Forwarding,
+    ) -> Result<Caller, ServiceError> {
+        let Some(node) = &forwarding.node else { return Err(no_node()) };
+        tracing::Span::current().record("node", node.as_str());
+        let (true, true, Some(scope)) = (operation.is_asked_by_nodes(), over_grpc, operation.scope()) else {
+            return Err(not_asked_by_nodes(operation));
+        };
+        let keys = self.keys.as_ref().map(|keys| keys.current());
+        let key = match (&forwarding.caller, keys) {
+            (ForwardedCaller::Anybody, None) => return Ok(Caller::without_key(AllowedMaps::Every)),
+            (ForwardedCaller::Anybody, Some(_)) => return Err(no_key(operation, false)),
+            (ForwardedCaller::HolderOf(name), Some(keys)) => keys.named(name),
+            (ForwardedCaller::HolderOf(_) | ForwardedCaller::Unreadable, _) => None,
+        };
+        let key = key.ok_or_else(|| unknown_caller(operation, &forwarding.caller))?;
+        tracing::Span::current().record("key", key.name.as_str());
+        holder(operation, scope, key)
+    }
+}
+
+/// The holder of a key, where that counts and is for the scope that `operation` takes.
+fn holder(operation: Operation, scope: Scope, key: Arc<Key>) -> Result<Caller, ServiceError> {
+    if let Some(refusal) = key.expired(SystemTime::now()) {
+        return Err(refusal);
+    }
+    check_scope(operation, scope, &key)?;
+    Ok(Caller::with(key))
+}
+
+fn no_node() -> ServiceError {
+    let message =
+        "the secret of the cluster is for its nodes, which say by `mrol-node` which they are: send a key";
+    ServiceError::new(Reason::KeyUnknown, message)
+}
+
+fn not_asked_by_nodes(operation: Operation) -> ServiceError {
+    let message = format!(
+        "{} is not what nodes ask each other, by this protocol or at all, and the secret of the cluster is for nothing \
+         else: send a key",
+        operation.name()
+    );
+    ServiceError::new(Reason::ScopeTooSmall, message)
+}
+
+fn unknown_caller(operation: Operation, caller: &ForwardedCaller) -> ServiceError {
+    let key = match caller {
+        ForwardedCaller::HolderOf(name) => format!("key {name}"),
+        ForwardedCaller::Anybody | ForwardedCaller::Unreadable => "the key".to_owned(),
+    };
+    let message = format!(
+        "{} needs a key: {key} is not known on the node that leads the map; all nodes of a cluster take the same keys",
+        operation.name()
+    );
+    ServiceError::new(Reason::KeyUnknown, message)
 }
 
 fn no_key(operation: Operation, given: bool) -> ServiceError {
@@ -136,10 +217,11 @@ fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), Serv
 
 /// Refuses the metrics, which speak of every map, to a key for some maps. Maps that a request names are checked by the
 /// service.
-fn check_metrics_allowed(operation: Operation, key: &Key) -> Result<(), ServiceError> {
-    if operation != Operation::Metrics || key.allowed_maps == AllowedMaps::Every {
+fn check_metrics_allowed(operation: Operation, caller: &Caller) -> Result<(), ServiceError> {
+    if operation != Operation::Metrics || *caller.allowed_maps() == AllowedMaps::Every {
         return Ok(());
     }
-    let message = format!("metrics speak of every map, key {} is for some", key.name);
+    let message =
+        format!("metrics speak of every map, key {} is for some", caller.name().unwrap_or_default());
     Err(ServiceError::new(Reason::MapNotAllowed, message))
 }

@@ -127,5 +127,5 @@ fn span(protocol: &'static str, operation: &'static str, request: &Request) -> S
     // Visible ASCII, so that any length is a border of characters.
     let request_id = request_id.map(|id| &id[..id.len().min(REQUEST_ID_LENGTH_MAX)]);
     let peer = extensions.get::<Peer>().map(display);
-    info_span!(target: REQUEST, "request", protocol, operation, request_id, peer, key = Empty)
+    info_span!(target: REQUEST, "request", protocol, operation, request_id, peer, node = Empty, key = Empty)
 }
