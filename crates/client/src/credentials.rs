@@ -157,6 +157,21 @@ mod tests {
     }
 
     #[test]
+    fn a_node_names_itself_and_its_caller_and_nobody_else_does() {
+        let credentials = Credentials::default().with_key("mrol_1").unwrap();
+        let sent = |mut shown: Shown| {
+            let request = shown.call(Request::new(())).unwrap();
+            [NODE, CALLER].map(|name| request.metadata().get(name).map(|it| it.to_str().unwrap().to_owned()))
+        };
+        assert_eq!(sent(credentials.shown()), [None, None]);
+        let (node, caller) = (NodeName::new("node-1").unwrap(), CallerName::new("R_1.b").unwrap());
+        let [of_caller, of_anybody] =
+            [Some(&caller), None].map(|caller| sent(credentials.shown().forwarded(&node, caller)));
+        assert_eq!(of_caller, [Some("node-1".to_owned()), Some("R_1.b".to_owned())]);
+        assert_eq!(of_anybody, [Some("node-1".to_owned()), None]);
+    }
+
+    #[test]
     fn what_is_no_secret_is_not_repeated() {
         for bad in ["", " ", "mrol_1\nmrol_2", "mrol 1", "mrol_1\u{7f}"] {
             let error = Credentials::default().with_key(bad).unwrap_err().to_string();

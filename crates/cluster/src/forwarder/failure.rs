@@ -78,3 +78,68 @@ fn cause_of(error: &ClientError) -> String {
         error => error.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mrol_client::wire::status_code;
+
+    fn told(asked: Asked, error: ClientError) -> ServiceError {
+        error_of(&NodeName::new("b").unwrap(), asked, error)
+    }
+
+    fn refused(reason: Option<&str>, code: tonic::Code) -> ClientError {
+        let (reason, message) = (reason.map(str::to_owned), "no".to_owned());
+        ClientError::Refused { code, reason, message, retry_after: None }
+    }
+
+    #[test]
+    fn what_the_other_node_says_is_told_as_it_is() {
+        for &reason in Reason::ALL {
+            let said = ServiceError::new(reason, "no").retry_after(Duration::from_millis(1500));
+            let error = ClientError::Refused {
+                code: status_code(reason.code()),
+                reason: Some(reason.as_str().to_owned()),
+                message: said.message.clone(),
+                retry_after: said.retry_after,
+            };
+            assert_eq!(told(Asked::Question, error.clone()), said);
+            let of_change = told(Asked::Change, error);
+            match reason {
+                // That node does not know what became of it.
+                Reason::Deadline | Reason::CallerGone => {
+                    assert_eq!(of_change.reason, Reason::OutcomeUnknown);
+                }
+                _ => assert_eq!(of_change, said),
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_sent_and_not_answered_is_unknown_of_a_change_alone() {
+        let (url, cause) = ("http://b:7334".to_owned(), "reset by peer".to_owned());
+        let bad = ServiceError::new(Reason::BadVerdict, "a verdict of a newer version");
+        let after_sending = [
+            ClientError::Lost { url: url.clone(), cause: cause.clone() },
+            ClientError::Foreign { url: url.clone(), cause: cause.clone() },
+            ClientError::Answer(bad),
+            refused(Some("brand_new"), tonic::Code::Unavailable),
+            refused(None, tonic::Code::Cancelled),
+        ];
+        for error in after_sending {
+            assert_eq!(told(Asked::Change, error.clone()).reason, Reason::OutcomeUnknown, "{error:?}");
+            assert_eq!(told(Asked::Question, error.clone()).reason, Reason::NoQuorum, "{error:?}");
+        }
+        let before_sending = [
+            ClientError::Unreachable { url: url.clone(), cause: cause.clone() },
+            ClientError::Untrusted { url: url.clone(), cause: cause.clone() },
+            ClientError::Url { url, problem: cause },
+        ];
+        for error in before_sending {
+            let told = told(Asked::Change, error);
+            assert_eq!(told.reason, Reason::NoQuorum);
+            let expected = "node b does not answer (reset by peer): nothing was changed, try again";
+            assert_eq!((&*told.message, told.retry_after), (expected, Some(NODE_SOON)));
+        }
+    }
+}

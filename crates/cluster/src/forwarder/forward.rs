@@ -147,3 +147,141 @@ impl Forward for Forwarder {
         Box::pin(self.ask(call, Asked::Question, async move |to| Ok(to.map_info(&call.map).await?.sightings)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use tokio::io::AsyncReadExt;
+    use tokio::net::{TcpListener, TcpStream};
+
+    use super::*;
+    use mrol_map::map::MapName;
+    use mrol_service::{Reason, UndoTarget};
+
+    const CONNECT_TIMEOUT: Duration = Duration::from_millis(300);
+
+    fn node(name: &str) -> NodeName {
+        NodeName::new(name).unwrap()
+    }
+
+    /// A forwarder that knows node `b` at this address.
+    fn forwarder(address: &str) -> Forwarder {
+        let forwarder = Forwarder::new(ForwarderSettings {
+            secret: Some("mrol_1".to_owned()),
+            connect_timeout: CONNECT_TIMEOUT,
+            call_timeout: Duration::from_millis(500),
+            ..ForwarderSettings::new(node("a"))
+        });
+        let forwarder = forwarder.unwrap();
+        forwarder.set_addresses([(node("b"), format!("http://{address}"))].into());
+        forwarder
+    }
+
+    fn call_to(name: &str) -> ForwardedCall {
+        ForwardedCall { to: node(name), caller: None, map: MapName::new("hall").unwrap() }
+    }
+
+    async fn undo(forwarder: &Forwarder, to: &str) -> ServiceError {
+        let undo = Undo { target: UndoTarget::Revision(1), request_id: None };
+        forwarder.undo(&call_to(to), undo).await.unwrap_err()
+    }
+
+    #[tokio::test]
+    async fn a_node_that_is_not_there_was_sent_nothing() {
+        let free = TcpListener::bind("127.0.0.1:0").await.unwrap().local_addr().unwrap();
+        let forwarder = forwarder(&free.to_string());
+        let refused = undo(&forwarder, "b").await;
+        assert_eq!(refused.reason, Reason::NoQuorum);
+        assert!(refused.message.starts_with("node b does not answer ("), "{refused}");
+        let unknown = undo(&forwarder, "c").await;
+        assert_eq!(unknown.reason, Reason::NoQuorum);
+        assert!(unknown.message.contains("its address is not known here"), "{unknown}");
+    }
+
+    #[tokio::test]
+    async fn of_a_change_that_is_not_answered_nobody_knows_the_outcome_and_of_a_question_it_does_not_matter()
+    {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let forwarder = forwarder(&listener.local_addr().unwrap().to_string());
+        // Whoever connects is heard and not answered.
+        let hears = tokio::spawn(async move {
+            let mut heard = Vec::new();
+            while let Ok((connection, _)) = listener.accept().await {
+                heard.push(connection);
+            }
+        });
+        assert_eq!(undo(&forwarder, "b").await.reason, Reason::OutcomeUnknown);
+        let query = EventsQuery::default();
+        let listed = forwarder.list_events(&call_to("b"), query.clone()).await.unwrap_err();
+        assert_eq!(listed.reason, Reason::NoQuorum);
+        let watched = forwarder.watch_events(&call_to("b"), query).await.map(drop).unwrap_err();
+        assert_eq!(watched.reason, Reason::NoQuorum);
+        hears.abort();
+    }
+
+    #[tokio::test]
+    async fn a_connection_that_is_lost_after_a_change_was_sent_is_made_again_for_the_next() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let forwarder = forwarder(&listener.local_addr().unwrap().to_string());
+        let hangs_up = async || -> TcpStream {
+            let (mut connection, _) = listener.accept().await.unwrap();
+            let mut heard = 0;
+            // The preface, the settings, the head and the message.
+            while heard < 200 {
+                heard += connection.read(&mut [0; 1024]).await.unwrap();
+            }
+            connection
+        };
+        for _ in 0..2 {
+            let (failed, _) = tokio::join!(undo(&forwarder, "b"), hangs_up());
+            assert_eq!(failed.reason, Reason::OutcomeUnknown, "{failed}");
+        }
+    }
+
+    #[tokio::test]
+    async fn many_callers_wait_for_a_silent_node_no_longer_than_one() {
+        // Once the queue of a listener that accepts nothing is full, nobody answers a connection.
+        let socket = tokio::net::TcpSocket::new_v4().unwrap();
+        socket.bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let listener = socket.listen(1).unwrap();
+        let address = listener.local_addr().unwrap();
+        let mut waiting = Vec::new();
+        for _ in 0..4 {
+            waiting.push(tokio::time::timeout(Duration::from_millis(200), TcpStream::connect(address)).await);
+        }
+        let forwarder = Arc::new(forwarder(&address.to_string()));
+        let begin = Instant::now();
+        let mut calls = tokio::task::JoinSet::new();
+        for _ in 0..20 {
+            let forwarder = Arc::clone(&forwarder);
+            calls.spawn(async move { undo(&forwarder, "b").await });
+        }
+        let told = calls.join_all().await;
+        assert!(told.iter().all(|error| error.reason == Reason::NoQuorum), "{told:?}");
+        assert!(begin.elapsed() < 3 * CONNECT_TIMEOUT, "{:?}", begin.elapsed());
+    }
+
+    #[test]
+    fn a_connection_stays_where_the_address_does() {
+        let forwarder = forwarder("127.0.0.1:1");
+        let peer = |name: &str| forwarder.peers.lock().get(&node(name)).cloned();
+        let first = peer("b").unwrap();
+        let two = |b: &str| [(node("b"), b.to_owned()), (node("c"), "http://127.0.0.1:2".to_owned())].into();
+        forwarder.set_addresses(two("http://127.0.0.1:1"));
+        assert!(Arc::ptr_eq(&first, &peer("b").unwrap()) && peer("c").is_some());
+        forwarder.set_addresses(two("http://127.0.0.1:3"));
+        assert!(!Arc::ptr_eq(&first, &peer("b").unwrap()));
+        forwarder.set_addresses(BTreeMap::new());
+        assert!(peer("b").is_none());
+    }
+
+    #[test]
+    fn the_secret_is_not_shown() {
+        let shown = format!("{:?}", forwarder("127.0.0.1:1"));
+        assert!(!shown.contains("mrol_1"), "{shown}");
+        let none = ForwarderSettings { secret: Some("a b".to_owned()), ..ForwarderSettings::new(node("a")) };
+        let refused = Forwarder::new(none).unwrap_err().to_string();
+        assert!(!refused.contains("a b"), "{refused}");
+    }
+}

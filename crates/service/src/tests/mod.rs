@@ -1,7 +1,9 @@
 //! Tests of the service as a whole.
 
+mod forwarding;
 mod looks;
 #[cfg(feature = "shuttle")]
 mod modeled;
 mod sleeping;
 mod turns;
+mod two_nodes;
