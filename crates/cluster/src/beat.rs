@@ -28,8 +28,17 @@ pub struct Beat {
 pub struct MapHead {
     /// Revision of its last change.
     pub revision: u64,
-    /// Epoch in which that was made.
+    /// How many claims of its log the node has read.
     pub epoch: u64,
+    /// Number of the last message of its log that the node has read.
+    #[serde(default)]
+    pub sequence: u64,
+    /// True where the node makes the map's changes.
+    #[serde(default)]
+    pub leads: bool,
+    /// True where the node takes no changes of the map any more: it has another history than the log, or its disk failed.
+    #[serde(default)]
+    pub is_parted: bool,
 }
 
 #[cfg(test)]
@@ -38,7 +47,10 @@ mod tests {
 
     #[test]
     fn a_beat_is_read_as_it_was_written_and_by_versions_that_know_less() {
-        let maps = BTreeMap::from([(Uuid::from_u128(7), MapHead { revision: 12, epoch: 3 })]);
+        let maps = BTreeMap::from([(
+            Uuid::from_u128(7),
+            MapHead { revision: 12, epoch: 3, sequence: 14, leads: true, is_parted: false },
+        )]);
         let beat = Beat {
             http: "http://a:7333".to_owned(),
             grpc: "http://a:7334".to_owned(),

@@ -144,7 +144,8 @@ impl Bucket {
         format!("KV_{}", self.name)
     }
 
-    fn subject(&self, key: &str) -> String {
+    /// The subject of a key.
+    pub(crate) fn subject(&self, key: &str) -> String {
         format!("$KV.{}.{key}", self.name)
     }
 

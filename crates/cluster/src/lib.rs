@@ -9,23 +9,29 @@
 //! 5. `jetstream_log`: the log of a map, which is a stream.
 //! 6. `following`: what makes a node's copy of a map follow its log.
 //! 7. `forwarder`: what takes changes on to the node that leads.
+//! 8. `catalog`: the list of maps that all nodes share.
+//! 9. `node`: a node of the cluster, which beats, keeps its copies of the maps and takes over those whose leader is gone.
 
 mod bases;
 mod beat;
 mod beats;
 mod bucket;
+mod catalog;
 mod engine;
 mod following;
 mod forwarder;
 mod jetstream_log;
 mod liveness;
+mod node;
 
 pub use bases::{BaseError, BasePointers, BaseStore, Orphans};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
-pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError};
+pub use catalog::{Catalog, CatalogError, Hints, Listing, MapEntry};
+pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError, StreamState};
 pub use following::Following;
 pub use forwarder::{Forwarder, ForwarderError, ForwarderSettings, NodeCertificate};
 pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
 pub use liveness::Liveness;
+pub use node::{Node, NodeSettings, NodeStatus};

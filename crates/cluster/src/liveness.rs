@@ -70,6 +70,11 @@ impl Liveness {
         }
     }
 
+    /// The other nodes of which no beat was seen since one's own last but one: their ports are worth a look.
+    pub fn silent(&self) -> impl Iterator<Item = &NodeName> {
+        self.others.iter().filter(|(_, last)| self.beats > last.at).map(|(node, _)| node)
+    }
+
     /// True of another node that beat, and is silent since.
     pub fn is_gone(&self, node: &NodeName) -> bool {
         self.others.get(node).is_some_and(|last| {

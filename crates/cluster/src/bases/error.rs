@@ -1,20 +1,10 @@
 //! What may go wrong with bases.
 
-use std::path::PathBuf;
-
 use crate::bucket::BucketError;
 
 /// Why a base was not put, found or fetched.
 #[derive(Debug, thiserror::Error)]
 pub enum BaseError {
-    /// A file of this machine.
-    #[error("{}: {cause}", path.display())]
-    File {
-        /// Which.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
     /// Another node changed the pointer meanwhile.
     #[error("the map's base was changed by another")]
     Changed,

@@ -2,14 +2,12 @@
 
 use std::future::Future;
 use std::io;
-use std::path::Path;
 use std::time::Duration;
 
 use async_nats::jetstream;
 use async_nats::jetstream::object_store::{InfoErrorKind, ObjectMetadata, ObjectStore};
 use async_nats::jetstream::stream::{Config, DiscardPolicy, StorageType};
-use tokio::fs::File;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::AsyncReadExt;
 use uuid::Uuid;
 
 use super::base::object_of;
@@ -26,6 +24,9 @@ const PIECE: usize = 512 << 10;
 
 /// How long the next bytes of a file may take. An election takes some seconds, and whoever fetches asks again.
 const NEXT_WITHIN: Duration = Duration::from_secs(10);
+
+/// Bytes that are reserved for a file before it comes, at most.
+const RESERVED_MAX: usize = 64 << 20;
 
 /// The files of bases, in the object store `mrol-bases`. A file is there as a whole or not at all.
 #[derive(Debug, Clone)]
@@ -47,51 +48,47 @@ impl BaseStore {
     /// and the servers' disks need for it.
     ///
     /// # Errors
-    /// The file cannot be read, NATS did not take it, or the file changed meanwhile.
-    pub fn put(&self, map: Uuid, base: &Base, file: &Path) -> Result<(), BaseError> {
-        let of_file = |cause| BaseError::File { path: file.to_owned(), cause };
+    /// NATS did not take it.
+    pub fn put(&self, map: Uuid, base: &Base, file: &[u8]) -> Result<(), BaseError> {
         self.engine.block_on(async {
-            let mut opened = File::open(file).await.map_err(of_file)?;
-            let bytes = opened.metadata().await.map_err(of_file)?.len();
             let name = object_of(base, map);
             let described =
                 ObjectMetadata { name: name.clone(), chunk_size: Some(PIECE), ..ObjectMetadata::default() };
-            let put = self.store().await?.put(described, &mut opened).await.map_err(unavailable)?;
-            match put.size as u64 == bytes {
+            let put = self.store().await?.put(described, &mut &*file).await.map_err(unavailable)?;
+            match put.size == file.len() {
                 true => Ok(()),
                 false => {
-                    Err(BaseError::Damaged(format!("{name}: {bytes} bytes, of which {} were put", put.size)))
+                    let (bytes, put) = (file.len(), put.size);
+                    Err(BaseError::Damaged(format!("{name}: {bytes} bytes, of which {put} were put")))
                 }
             }
         })
     }
 
-    /// Fetches a map file into a new file, and syncs that. What is there after an error is to be deleted.
+    /// Fetches a map file.
     ///
     /// # Errors
-    /// The file cannot be written, NATS does not have all of it, or did not answer.
-    pub fn fetch(&self, map: Uuid, base: &Base, file: &Path) -> Result<(), BaseError> {
-        let of_file = |cause| BaseError::File { path: file.to_owned(), cause };
+    /// NATS does not have all of it, or did not answer.
+    pub fn fetch(&self, map: Uuid, base: &Base) -> Result<Vec<u8>, BaseError> {
         let name = object_of(base, map);
         self.engine.block_on(async {
             let store = self.store().await?;
             let mut object = in_time(store.get(name.as_str())).await?.map_err(unavailable)?;
-            let mut into = File::create_new(file).await.map_err(of_file)?;
+            let expected = object.info().size;
+            // What is said of the size is not believed before it comes.
+            let mut file = Vec::with_capacity(expected.min(RESERVED_MAX));
             let mut buffer = vec![0; PIECE];
-            let (mut fetched, expected) = (0, object.info().size);
             loop {
                 // The store compares all of it with its hash.
                 let read = in_time(object.read(&mut buffer)).await?.map_err(|error| damaged(&name, error))?;
                 if read == 0 {
                     break;
                 }
-                into.write_all(&buffer[..read]).await.map_err(of_file)?;
-                fetched += read;
+                file.extend_from_slice(&buffer[..read]);
             }
-            into.sync_all().await.map_err(of_file)?;
-            match fetched == expected {
-                true => Ok(()),
-                false => Err(BaseError::Damaged(format!("{name}: {fetched} bytes of {expected}"))),
+            match file.len() == expected {
+                true => Ok(file),
+                false => Err(BaseError::Damaged(format!("{name}: {} bytes of {expected}", file.len()))),
             }
         })
     }

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use async_nats::jetstream::stream::Config;
-use serde::Serialize;
 use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
 
 use super::api::{ApiError, CallError};
 use super::connection::Engine;
@@ -28,6 +28,18 @@ pub enum StreamError {
     },
 }
 
+/// What is in a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub struct StreamState {
+    /// Messages.
+    pub messages: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Number of the last.
+    #[serde(rename = "last_seq")]
+    pub last_sequence: u64,
+}
+
 impl Engine {
     /// Makes a stream where there is none. One that is there stays as it is.
     pub(crate) async fn create_stream(&self, config: &Config) -> Result<(), StreamError> {
@@ -40,6 +52,18 @@ impl Engine {
     /// Makes sure that there is a stream.
     pub(crate) async fn find_stream(&self, stream: &str) -> Result<(), StreamError> {
         self.ask_of_stream("INFO", stream, &()).await
+    }
+
+    /// What is in a stream, as its leader says.
+    pub(crate) async fn stream_state(&self, stream: &str) -> Result<StreamState, StreamError> {
+        #[derive(Deserialize)]
+        struct Info {
+            state: StreamState,
+        }
+        let info = self.call::<Info>(&format!("STREAM.INFO.{stream}"), &(), WITHIN).await;
+        let failed =
+            |error: CallError| StreamError::Failed { stream: stream.to_owned(), cause: error.to_string() };
+        info.map(|info| info.state).map_err(failed)
     }
 
     /// Deletes the messages of a stream before this one, which stays.

@@ -11,7 +11,7 @@ use super::publish;
 use super::read;
 use super::stream::config_of;
 use crate::bases::BasePointers;
-use crate::engine::{Engine, StreamError};
+use crate::engine::{Engine, StreamError, StreamState};
 
 /// The log of a map, in the stream `mrol-UUID`.
 #[derive(Debug)]
@@ -59,6 +59,14 @@ impl JetStreamLog {
     /// Says what NATS said.
     pub fn cut_before(&self, sequence: u64) -> Result<(), StreamError> {
         self.engine.block_on(self.engine.cut_stream(&self.names.stream, sequence))
+    }
+
+    /// What NATS keeps of the log.
+    ///
+    /// # Errors
+    /// Says what NATS said.
+    pub fn used(&self) -> Result<StreamState, StreamError> {
+        self.engine.block_on(self.engine.stream_state(&self.names.stream))
     }
 
     /// The connection.

@@ -1,6 +1,5 @@
 //! Map files are put, pointed to and fetched, and the log is cut behind them.
 
-use std::fs;
 use std::time::{Duration, Instant};
 
 use mrol_cluster::{BaseError, BasePointers, BaseStore, JetStreamLog, Orphans};
@@ -39,10 +38,7 @@ fn a_node_that_comes_late_loads_the_base_and_reads_on() {
         writer.publish_at_last(&message);
     }
     assert!(matches!(pointers.read(map), Ok(None)));
-    let folder = tempfile::tempdir().unwrap();
-    let (file, fetched) = (folder.path().join("map"), folder.path().join("fetched"));
-    let bytes = file_of(20_000_000);
-    fs::write(&file, &bytes).unwrap();
+    let file = file_of(20_000_000);
     let base = base_at(writer.written[4].position());
     let begun = Instant::now();
     eventually(|| store.put(map, &base, &file));
@@ -57,9 +53,9 @@ fn a_node_that_comes_late_loads_the_base_and_reads_on() {
     });
     assert_eq!((&found, found_revision), (&base, revision));
     let begun = Instant::now();
-    store.fetch(map, &found, &fetched).unwrap();
+    let fetched = store.fetch(map, &found).unwrap();
     println!("20 MB fetched in {:?}", begun.elapsed());
-    assert!(fs::read(&fetched).unwrap() == bytes, "another file");
+    assert!(fetched == file, "another file");
     assert_eq!(log.read_behind(found.position).unwrap(), writer.written[5..]);
     assert_eq!(log.read_behind(writer.written[0].position()), Err(LogError::NoSuchPosition));
     assert_eq!(read_all(&log).0, writer.written[4..]);
@@ -74,10 +70,7 @@ fn a_file_whose_upload_was_cut_short_is_not_there_and_is_put_again() {
     let Some(mut servers) = NatsServers::start(1) else { return };
     let (engine, map) = (servers.engine(), Uuid::new_v4());
     let store = BaseStore::create(&engine).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("map");
-    let bytes = file_of(50_000_000);
-    fs::write(&file, &bytes).unwrap();
+    let file = file_of(50_000_000);
     let base = base_at(Position { sequence: 3, id: Some(Uuid::new_v4()) });
     let cut = std::thread::scope(|scope| {
         let put = scope.spawn(|| store.put(map, &base, &file));
@@ -90,11 +83,9 @@ fn a_file_whose_upload_was_cut_short_is_not_there_and_is_put_again() {
     assert!(!eventually(|| store.has(map, &base)));
     let orphans = store.sweep(&Orphans::default()).unwrap();
     assert!(orphans.pieces() > 0, "nothing was put before the servers were killed");
-    let fetched = folder.path().join("fetched");
-    assert!(matches!(store.fetch(map, &base, &fetched), Err(BaseError::Unavailable(_))));
+    assert!(matches!(store.fetch(map, &base), Err(BaseError::Unavailable(_))));
     eventually(|| store.put(map, &base, &file));
     assert_eq!(store.sweep(&Orphans::default()).unwrap(), orphans, "what was put is no orphan");
     assert_eq!(store.sweep(&orphans).unwrap(), Orphans::default());
-    store.fetch(map, &base, &fetched).unwrap();
-    assert!(fs::read(&fetched).unwrap() == bytes, "another file");
+    assert!(store.fetch(map, &base).unwrap() == file, "another file");
 }

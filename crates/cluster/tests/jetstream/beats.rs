@@ -14,7 +14,10 @@ fn beat(revision: u64) -> Beat {
         grpc: "http://127.0.0.1:7334".to_owned(),
         version: "0.2.0".to_owned(),
         record_version: 1,
-        maps: BTreeMap::from([(Uuid::from_u128(1), MapHead { revision, epoch: 2 })]),
+        maps: BTreeMap::from([(
+            Uuid::from_u128(1),
+            MapHead { revision, epoch: 2, sequence: revision, leads: false, is_parted: false },
+        )]),
         free_bytes: 1 << 30,
     }
 }

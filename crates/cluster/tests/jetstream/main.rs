@@ -5,6 +5,7 @@ mod bases;
 mod beats;
 mod connecting;
 mod lost_servers;
+mod nodes;
 mod older_copies;
 mod publishing;
 mod random_kills;

@@ -42,7 +42,7 @@ impl Node {
     fn start(runtime: &Runtime, engine: &Engine, name: &str, folder: &Path, copy: &(Uuid, Bytes)) -> Self {
         let (service, (uuid, file)) = (service(folder), copy.clone());
         if runtime.block_on(service.map_info(&map())).is_err() {
-            runtime.block_on(service.copy_map(map(), uuid, file)).unwrap();
+            runtime.block_on(service.copy_map(map(), uuid, file, false)).unwrap();
         }
         let log = Arc::new(eventually(|| JetStreamLog::create(engine, uuid)));
         let node = NodeName::new(name).unwrap();

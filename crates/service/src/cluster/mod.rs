@@ -7,4 +7,4 @@ mod shared_catalog;
 
 pub use forward::{Forward, ForwardedCall, ForwardedEvents};
 pub use parts::{Cluster, Later};
-pub use shared_catalog::SharedCatalog;
+pub use shared_catalog::{NewMap, SharedCatalog};

@@ -12,7 +12,7 @@ use crate::resources::Reservation;
 use crate::work::{Requester, Share};
 use mrol_map::map::{Change, Committed, MultiResolutionMap};
 use mrol_map::util::StopSignal;
-use mrol_store::{Pin, Record};
+use mrol_store::{Pin, Record, Snapshot};
 
 /// Keeps one robot's scans in order; held until its change is visible.
 pub(crate) type RobotLock = Arc<OwnedMutexGuard<()>>;
@@ -55,7 +55,10 @@ pub(crate) enum SharedAct {
     HandOver(NodeName),
     /// Tells where another node can begin to read, with a copy of this node's map as it is now or later; none where
     /// that would be in the middle of a change.
+    #[cfg(test)]
     Base(oneshot::Sender<Option<Base>>),
+    /// The same, with a copy of the map as it is there.
+    Copy(oneshot::Sender<Option<(Base, Snapshot)>>),
 }
 
 /// A change that is known before its turn comes.

@@ -34,6 +34,10 @@ impl MapService {
     ) -> Result<(MapInfo, bool), ServiceError> {
         let map = &name.clone();
         let work = async {
+            if let Some(cluster) = &self.inner.settings.cluster {
+                let (map, created) = self.create_in(cluster, &name, settings).await?;
+                return Ok((describe_made(map).await?, created));
+            }
             let name = self.allowed_maps.check(&name)?;
             let is_new = !self.inner.catalog.has(&name);
             let settings = settings.checked()?;
@@ -168,6 +172,9 @@ impl MapService {
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
         let work = async {
+            if let Some(cluster) = &self.inner.settings.cluster {
+                return self.delete_in(cluster, name).await;
+            }
             let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
             let name = self.allowed_maps.check(name)?;
             run_to_completion(async move { inner.catalog.delete(&name, &asker).await }).await
@@ -185,6 +192,10 @@ impl MapService {
     /// when it is renamed, and a loss of power may bring its former name back.
     pub async fn rename_map(&self, name: &MapName, to: &MapName) -> Result<MapInfo, ServiceError> {
         let work = async {
+            if self.inner.settings.cluster.is_some() {
+                let message = "the nodes of a cluster rename no map: make another, or restore a copy under another name";
+                return Err(ServiceError::new(Reason::MapShared, message));
+            }
             let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
             let (name, to) = (self.allowed_maps.check(name)?, self.allowed_maps.check(to)?);
             let rename = async move { inner.catalog.rename(&name, &to, &asker).await };
@@ -227,6 +238,10 @@ impl MapService {
     ) -> Result<MapInfo, ServiceError> {
         let map = &name.clone();
         let work = async {
+            if let Some(cluster) = &self.inner.settings.cluster {
+                let map = self.restore_in(cluster, &name, file, replace).await?;
+                return Ok((None, describe_made(map).await?));
+            }
             let name = self.allowed_maps.check(&name)?;
             if replace && self.allowed_maps != AllowedMaps::Every {
                 let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
@@ -298,7 +313,7 @@ async fn describe_made(map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
 }
 
 /// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
-async fn run_to_completion<T: Send + 'static>(
+pub(super) async fn run_to_completion<T: Send + 'static>(
     change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::spawn(polled_by_runtime(change)).await;

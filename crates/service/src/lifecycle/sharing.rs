@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 use uuid::Uuid;
 
 use super::map_file::from_file;
+use super::operations::run_to_completion;
 use crate::commit::{Lead, Refusal, SharedAct, Submission};
-use crate::error::{Reason, ServiceError};
+use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
-use crate::maps::{BuiltMap, HostedMap};
+use crate::maps::{BuiltMap, HostedMap, snapshot_bytes};
 use crate::replication::{Base, NodeName, ReplicatedLog};
 use crate::request::MapVersion;
 use crate::work::Requester;
@@ -45,8 +46,21 @@ impl MapService {
         shared
     }
 
+    /// The uuid of this node's copy of a map; none where it has none.
+    ///
+    /// # Errors
+    /// `MapUnavailable` where it has one that it cannot open.
+    pub async fn uuid_of_copy(&self, name: &MapName) -> Result<Option<Uuid>, ServiceError> {
+        match self.map(name).await {
+            Ok(map) => Ok(Some(map.uuid)),
+            Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Takes in a copy of a map that another node has, as the same incarnation: under its uuid, to be shared by
-    /// [`MapService::share_map`].
+    /// [`MapService::share_map`]. With `replace` it takes the place of an older copy of the same map, which is kept as
+    /// `NAME-replaced-REVISION`.
     ///
     /// # Errors
     /// As for [`MapService::restore_map`].
@@ -55,17 +69,47 @@ impl MapService {
         name: MapName,
         map_uuid: Uuid,
         file: Bytes,
+        replace: bool,
     ) -> Result<MapVersion, ServiceError> {
         let reachable = self.allowed_maps.check(&name)?;
         self.inner.budget.check_to_grow()?;
         let maps_max = self.limits().maps_max;
-        self.inner.catalog.check_free(&reachable, maps_max, false)?;
+        self.inner.catalog.check_free(&reachable, maps_max, replace)?;
         let inner = Arc::clone(&self.inner);
         let build = move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
         let built = self.inner.lanes.map_files.run(&self.asker, build).await??;
         let built = BuiltMap { uuid: map_uuid, ..built };
-        let (_, map) = self.inner.catalog.restore(reachable, built, maps_max, false, &self.asker).await?;
+        let (_, map) = self.inner.catalog.restore(reachable, built, maps_max, replace, &self.asker).await?;
         Ok(map.version_now())
+    }
+
+    /// Deletes this node's copy of a map, if it is the one of this uuid.
+    ///
+    /// # Errors
+    /// As for [`MapService::delete_map`].
+    pub async fn drop_copy(&self, name: &MapName, map_uuid: Uuid) -> Result<(), ServiceError> {
+        if self.uuid_of_copy(name).await? != Some(map_uuid) {
+            return Ok(());
+        }
+        let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
+        let reachable = self.allowed_maps.check(name)?;
+        run_to_completion(async move { inner.catalog.delete(&reachable, &asker).await }).await.map(drop)
+    }
+
+    /// The version of a map, as it is now.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn version_of(&self, name: &MapName) -> Result<MapVersion, ServiceError> {
+        Ok(self.map(name).await?.version_now())
+    }
+
+    /// Which node makes the changes of a map; the receiver hears when that is another.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn lead_of(&self, name: &MapName) -> Result<watch::Receiver<Lead>, ServiceError> {
+        Ok(self.map(name).await?.commit_queue.lead())
     }
 
     /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it
@@ -128,15 +172,21 @@ impl MapService {
         self.act_on(name, SharedAct::HandOver(node)).await?.ok_or_else(went_on)
     }
 
-    /// Where the log of a shared map can begin for a node that starts with a copy of this node's map, taken now or
-    /// later; none where the newest change is not whole yet.
+    /// Where the log of a shared map can begin, with a map file of the map as it is there; none where the newest change
+    /// is not whole yet. The map takes no changes while it is copied in memory.
     ///
     /// # Errors
-    /// As for [`MapService::share_map`].
-    pub async fn log_base(&self, name: &MapName) -> Result<Option<Base>, ServiceError> {
+    /// As for [`MapService::share_map`]; `ResourceExhausted` where there is no memory for the file.
+    pub async fn log_base(&self, name: &MapName) -> Result<Option<(Base, Bytes)>, ServiceError> {
+        let map = self.map(name).await?;
+        let _reserved = self.inner.budget.reserve_transient(snapshot_bytes(&map.map), "a map file")?;
         let (tell, told) = oneshot::channel();
-        self.act_on(name, SharedAct::Base(tell)).await?;
-        told.await.map_err(commit_thread_ended)
+        self.act_on(name, SharedAct::Copy(tell)).await?;
+        let Some((base, copy)) = told.await.map_err(commit_thread_ended)? else { return Ok(None) };
+        let encode = move |_: StopSignal<'_>| copy.encode();
+        let file = self.inner.lanes.map_files.run(&self.asker, encode).await?;
+        let file = file.map_err(|error| ServiceError::new(Reason::NotEncoded, error.to_string()))?;
+        Ok(Some((base, file.into())))
     }
 
     /// None where there is more to do in another turn.

@@ -12,6 +12,7 @@ use uuid::Uuid;
 use super::built_map::BuiltMap;
 use super::hosted_map::HostedMap;
 use super::named::{Named, Place};
+use super::node_mark::check_node;
 use super::opening::{find_all, maps_at_once, not_stored, waiting_within};
 use super::same_settings::same_settings;
 use crate::caller::{AllowedMaps, Reachable};
@@ -59,6 +60,9 @@ impl Catalog {
         let ServiceSettings { data_dir, store, limits, .. } = settings;
         let open = |path: &Path| DataDir::open(path, store.clone());
         let data_dir = data_dir.as_deref().map(open).transpose().map_err(not_stored)?;
+        if let Some(data_dir) = &data_dir {
+            check_node(data_dir, settings.cluster.as_ref())?;
+        }
         let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
         let maps = maps.unwrap_or_default();
         Ok(Self {

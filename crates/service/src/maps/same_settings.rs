@@ -8,7 +8,7 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::map::MapSettings;
 
 /// Making a map again as it is changes nothing; as another it is a conflict.
-pub(super) fn same_settings(
+pub(crate) fn same_settings(
     map: Arc<HostedMap>,
     settings: MapSettings,
 ) -> Result<Arc<HostedMap>, ServiceError> {

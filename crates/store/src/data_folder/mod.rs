@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! DATA_DIR/lock                   held by the one process that uses the folder
+//! DATA_DIR/node                   the node of a cluster that the folder belongs to; not there of a server by itself
 //! DATA_DIR/maps/NAME.UUID/        a map, see `map_files`
 //! DATA_DIR/maps/NAME/             a map of a former release: gets its uuid when it is opened
 //! DATA_DIR/maps/NAME.UUID.damaged/   a map whose files are damaged, set aside by `mrol doctor`: read by nobody
@@ -20,6 +21,7 @@
 
 mod contents;
 mod data_dir;
+mod node_mark;
 
 pub use contents::DataDirContents;
 pub use data_dir::DataDir;

@@ -5,6 +5,7 @@ use crate::commit::submission::{Refusal, SharedAct};
 use crate::commit::worker::Worker;
 use crate::replication::Member;
 use mrol_map::map::Committed;
+use mrol_store::Snapshot;
 
 impl Worker {
     /// Does what a node does about a map that several share. `Stale` where there is more to follow than one turn takes.
@@ -18,15 +19,22 @@ impl Worker {
             return self.follow();
         }
         let Some(member) = &self.member else { return Err(not_shared(&self.name).into()) };
+        let member_map = member.map();
         match act {
             SharedAct::Join { .. } => {}
             SharedAct::Follow { newest } if newest == Some(member.position().sequence) => {}
             SharedAct::Follow { .. } => return self.follow(),
             SharedAct::Lead(live) => self.lead(&live)?,
             SharedAct::HandOver(node) => self.hand_over(node)?,
+            #[cfg(test)]
             SharedAct::Base(told) => {
                 self.catch_up()?;
                 drop(told.send(self.base_here()));
+            }
+            SharedAct::Copy(told) => {
+                self.catch_up()?;
+                let copy = self.base_here().map(|base| (base, Snapshot::of(&self.map, member_map)));
+                drop(told.send(copy));
             }
         }
         Ok(Committed::none(self.map.content_version()))

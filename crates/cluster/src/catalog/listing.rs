@@ -1,0 +1,133 @@
+//! The maps of a cluster, and those that were deleted.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mrol_map::map::MapName;
+use mrol_service::replication::NodeName;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use uuid::Uuid;
+
+/// Maps and deleted maps that are listed, at most: the list is one message of NATS.
+const MAPS_MAX: usize = 4_000;
+
+/// The maps of a cluster, by name, and those that were deleted. What a later version adds is kept, and means nothing to
+/// this one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Listing {
+    maps: BTreeMap<String, MapEntry>,
+    /// Maps that were deleted, as long as a node may still have a copy. That a map is not listed deletes nothing
+    /// anywhere: an older list may have been put back.
+    #[serde(default)]
+    deleted: BTreeSet<Uuid>,
+    #[serde(flatten)]
+    later: Map<String, Value>,
+}
+
+/// What is listed of a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MapEntry {
+    /// Its uuid.
+    pub uuid: Uuid,
+    /// The node that is to lead it whenever it can; none where any will do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    leader: Option<String>,
+    #[serde(flatten)]
+    later: Map<String, Value>,
+}
+
+impl MapEntry {
+    /// Of a map that any node may lead.
+    pub fn new(uuid: Uuid) -> Self {
+        Self { uuid, leader: None, later: Map::new() }
+    }
+
+    /// The node that is to lead it whenever it can.
+    pub fn leader(&self) -> Option<NodeName> {
+        self.leader.as_deref().and_then(|name| NodeName::new(name).ok())
+    }
+}
+
+impl Listing {
+    /// The maps by name. What is no name is left out.
+    pub fn maps(&self) -> impl Iterator<Item = (MapName, &MapEntry)> {
+        self.maps.iter().filter_map(|(name, entry)| Some((MapName::new(name).ok()?, entry)))
+    }
+
+    /// The map of that name.
+    pub fn map(&self, name: &MapName) -> Option<&MapEntry> {
+        self.maps.get(name.as_str())
+    }
+
+    /// True of a map that was deleted: no node keeps a copy.
+    pub fn is_deleted(&self, uuid: Uuid) -> bool {
+        self.deleted.contains(&uuid)
+    }
+
+    /// Those that were deleted.
+    pub fn deleted(&self) -> impl Iterator<Item = Uuid> {
+        self.deleted.iter().copied()
+    }
+
+    /// Enters a map under a name that is free.
+    pub(super) fn enter(&mut self, name: &MapName, uuid: Uuid) {
+        self.maps.insert(name.as_str().to_owned(), MapEntry::new(uuid));
+    }
+
+    /// True where no more maps can be listed.
+    pub(super) fn is_full(&self) -> bool {
+        self.maps.len() + self.deleted.len() >= MAPS_MAX
+    }
+
+    /// Takes a map out for good, and says its uuid.
+    pub(super) fn delete(&mut self, name: &MapName) -> Option<Uuid> {
+        let entry = self.maps.remove(name.as_str())?;
+        self.deleted.insert(entry.uuid);
+        Some(entry.uuid)
+    }
+
+    /// Says which node is to lead a map; false where there is no such map.
+    pub(super) fn set_leader(&mut self, name: &MapName, leader: Option<&NodeName>) -> bool {
+        let entry = self.maps.get_mut(name.as_str());
+        entry.map(|entry| entry.leader = leader.map(ToString::to_string)).is_some()
+    }
+
+    /// Forgets maps that were deleted.
+    pub(super) fn forget(&mut self, deleted: &BTreeSet<Uuid>) {
+        self.deleted.retain(|uuid| !deleted.contains(uuid));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> MapName {
+        MapName::new(text).unwrap()
+    }
+
+    #[test]
+    fn a_map_that_is_deleted_stays_so() {
+        let (mut listing, [one, two]) = (Listing::default(), [1, 2].map(Uuid::from_u128));
+        listing.enter(&name("hall"), one);
+        assert_eq!(listing.delete(&name("hall")), Some(one));
+        assert_eq!(listing.delete(&name("hall")), None);
+        listing.enter(&name("hall"), two);
+        assert!(listing.is_deleted(one) && !listing.is_deleted(two));
+        listing.forget(&BTreeSet::from([one]));
+        assert!(!listing.is_deleted(one));
+    }
+
+    #[test]
+    fn what_a_later_version_adds_is_kept() {
+        let text = r#"{"maps":{"hall":{"uuid":"00000000-0000-0000-0000-000000000001","copies":["a"]}},"mood":"good"}"#;
+        let mut listing: Listing = serde_json::from_str(text).unwrap();
+        assert!(listing.set_leader(&name("hall"), Some(&NodeName::new("a").unwrap())));
+        assert!(!listing.set_leader(&name("yard"), None));
+        let written = serde_json::to_string(&listing).unwrap();
+        assert!(written.contains(r#""copies":["a"]"#) && written.contains(r#""mood":"good""#), "{written}");
+        let read: Listing = serde_json::from_str(&written).unwrap();
+        assert_eq!(read.map(&name("hall")).unwrap().leader().unwrap().as_str(), "a");
+        assert_eq!(read, listing);
+    }
+}

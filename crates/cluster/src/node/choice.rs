@@ -1,0 +1,192 @@
+//! Who is to lead a map.
+
+use mrol_service::Lead;
+use mrol_service::replication::NodeName;
+use uuid::Uuid;
+
+use super::view::View;
+
+/// Beats for which a node that does not lead what it should is waited for: it may be starting, or another may be better
+/// placed.
+const PATIENCE: u64 = 4;
+
+/// What a node does about the lead of a map.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Choice {
+    /// Nothing.
+    Stay,
+    /// It takes over.
+    Claim,
+    /// It gives the lead to another.
+    HandOver(NodeName),
+}
+
+/// What a node knows of a map when it chooses.
+#[derive(Debug, Clone)]
+pub(super) struct Known<'a> {
+    /// The node itself.
+    pub(super) own: &'a NodeName,
+    /// The map.
+    pub(super) map: Uuid,
+    /// Revision of its own copy.
+    pub(super) revision: u64,
+    /// Number of the last message of the log that it had read a beat ago.
+    pub(super) sequence_before: u64,
+    /// Who leads, as far as it has read the log.
+    pub(super) lead: &'a Lead,
+    /// The node that is to lead whenever it can.
+    pub(super) wished: Option<&'a NodeName>,
+    /// The others.
+    pub(super) view: &'a View,
+    /// Its own beats since it has seen no node lead the map.
+    pub(super) waited: u64,
+}
+
+/// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart by
+/// the log. It is made so that one claims as a rule, and soon.
+pub(super) fn choose(known: &Known<'_>) -> Choice {
+    match known.lead {
+        Lead::Shared { is_here: true, .. } => {
+            match known.wished.filter(|wished| can_take_over(known, wished)) {
+                Some(wished) => Choice::HandOver(wished.clone()),
+                None => Choice::Stay,
+            }
+        }
+        Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
+        Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
+        _ => Choice::Stay,
+    }
+}
+
+/// True where another node leads, or may be about to.
+fn is_led_elsewhere(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
+    let Some(leader) = leader.filter(|leader| *leader != known.own) else { return false };
+    let has_it = known.view.holders(known.map).any(|(node, _)| node == leader);
+    has_it || (known.view.is_live(leader) && known.waited < PATIENCE)
+}
+
+/// True of the node that is furthest; of several, of the one that leads by the log, is wished, or has the first name.
+fn is_first(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
+    let rank = |node: &NodeName, revision: u64| {
+        (revision, leader == Some(node), known.wished == Some(node), std::cmp::Reverse(node.clone()))
+    };
+    let own = rank(known.own, known.revision);
+    let mut others = known.view.holders(known.map);
+    match known.waited < PATIENCE {
+        true => others.all(|(node, head)| rank(node, head.revision) < own),
+        // Whoever would have been first does not come.
+        false => others.all(|(_, head)| head.revision <= known.revision),
+    }
+}
+
+/// True of another node that has read what this one had a beat ago.
+fn can_take_over(known: &Known<'_>, node: &NodeName) -> bool {
+    let mut holders = known.view.holders(known.map);
+    holders.any(|(holder, head)| holder == node && head.sequence >= known.sequence_before)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::beat::{Beat, MapHead};
+    use crate::node::view::Seen;
+
+    const MAP: Uuid = Uuid::from_u128(1);
+
+    fn node(name: &str) -> NodeName {
+        NodeName::new(name).unwrap()
+    }
+
+    /// Other nodes: name, whether it is live, the revision of its copy if it has one, whether that is parted.
+    fn view(others: &[(&str, bool, Option<u64>, bool)]) -> View {
+        let seen = |&(name, is_live, revision, is_parted): &(&str, bool, Option<u64>, bool)| {
+            let head = |revision| {
+                let head = MapHead { revision, epoch: 1, sequence: revision, leads: false, is_parted };
+                (MAP, head)
+            };
+            let beat = Beat {
+                http: String::new(),
+                grpc: String::new(),
+                version: String::new(),
+                record_version: 0,
+                maps: revision.map(head).into_iter().collect(),
+                free_bytes: 0,
+            };
+            (node(name), Seen { beat, is_live })
+        };
+        View { beats: 10, others: others.iter().map(seen).collect::<BTreeMap<_, _>>() }
+    }
+
+    fn led_by(leader: Option<&str>, is_here: bool) -> Lead {
+        Lead::Shared { leader: leader.map(node), is_here, epoch: 1, sequence: 5 }
+    }
+
+    /// What `b` at revision 5 does.
+    fn chosen(
+        lead: &Lead,
+        others: &[(&str, bool, Option<u64>, bool)],
+        waited: u64,
+        wished: Option<&str>,
+    ) -> Choice {
+        let (own, wished, view) = (node("b"), wished.map(node), view(others));
+        let (wished, view) = (wished.as_ref(), &view);
+        choose(&Known { own: &own, map: MAP, revision: 5, sequence_before: 5, lead, wished, view, waited })
+    }
+
+    #[test]
+    fn who_leads_goes_on_and_who_sees_a_leader_follows() {
+        assert_eq!(chosen(&led_by(Some("b"), true), &[("a", true, Some(9), false)], 9, None), Choice::Stay);
+        assert_eq!(chosen(&led_by(Some("a"), false), &[("a", true, Some(4), false)], 9, None), Choice::Stay);
+        assert_eq!(chosen(&Lead::NotJoined, &[], 9, None), Choice::Stay);
+        assert_eq!(chosen(&Lead::Alone, &[], 9, None), Choice::Stay);
+    }
+
+    #[test]
+    fn of_a_leader_that_is_gone_the_furthest_takes_over_and_of_equals_the_first_name() {
+        let gone = ("a", false, Some(5), false);
+        let lead = led_by(Some("a"), false);
+        assert_eq!(chosen(&lead, &[gone, ("c", true, Some(5), false)], 0, None), Choice::Claim);
+        assert_eq!(chosen(&lead, &[gone, ("c", true, Some(6), false)], 0, None), Choice::Stay);
+        assert_eq!(chosen(&lead, &[gone, ("c", true, Some(5), false)], 0, Some("c")), Choice::Stay);
+        assert_eq!(chosen(&lead, &[gone, ("aa", true, Some(5), false)], 0, None), Choice::Stay);
+        // It does not come.
+        assert_eq!(chosen(&lead, &[gone, ("aa", true, Some(5), false)], PATIENCE, None), Choice::Claim);
+        assert_eq!(chosen(&lead, &[gone, ("aa", true, Some(6), false)], PATIENCE, None), Choice::Stay);
+        // One that is gone, or has parted, counts for nothing.
+        assert_eq!(chosen(&lead, &[gone, ("aa", false, Some(9), false)], 0, None), Choice::Claim);
+        assert_eq!(chosen(&lead, &[gone, ("aa", true, Some(9), true)], 0, None), Choice::Claim);
+    }
+
+    #[test]
+    fn a_leader_that_is_back_without_its_copy_is_waited_for_and_not_for_ever() {
+        let lead = led_by(Some("a"), false);
+        assert_eq!(chosen(&lead, &[("a", true, None, false)], 0, None), Choice::Stay);
+        assert_eq!(chosen(&lead, &[("a", true, None, false)], PATIENCE, None), Choice::Claim);
+        assert_eq!(chosen(&lead, &[("a", true, Some(5), true)], PATIENCE, None), Choice::Claim);
+    }
+
+    #[test]
+    fn who_leads_by_the_log_and_was_started_again_takes_over_before_others() {
+        let lead = led_by(Some("b"), false);
+        assert_eq!(chosen(&lead, &[("a", true, Some(5), false)], 0, Some("a")), Choice::Claim);
+        assert_eq!(chosen(&lead, &[("a", true, Some(7), false)], 0, None), Choice::Stay);
+    }
+
+    #[test]
+    fn a_map_that_nobody_led_yet_is_claimed() {
+        assert_eq!(chosen(&led_by(None, false), &[], 0, None), Choice::Claim);
+    }
+
+    #[test]
+    fn the_lead_goes_to_the_node_that_is_wished_once_that_has_followed() {
+        let lead = led_by(Some("b"), true);
+        let to = |others: &[(&str, bool, Option<u64>, bool)]| chosen(&lead, others, 0, Some("c"));
+        assert_eq!(to(&[("c", true, Some(5), false)]), Choice::HandOver(node("c")));
+        assert_eq!(to(&[("c", true, Some(4), false)]), Choice::Stay, "it is behind");
+        assert_eq!(to(&[("c", false, Some(5), false)]), Choice::Stay, "it is gone");
+        assert_eq!(to(&[("c", true, Some(5), true)]), Choice::Stay, "it has parted");
+        assert_eq!(to(&[("c", true, None, false)]), Choice::Stay, "it has no copy");
+    }
+}

@@ -1,0 +1,88 @@
+//! Puts a base, and cuts the front of a log off.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use mrol_map::map::MapName;
+use mrol_service::MapService;
+use mrol_service::replication::Base;
+use uuid::Uuid;
+
+use super::joined::{Joined, blocking};
+use crate::bases::BaseError;
+use crate::jetstream_log::JetStreamLog;
+
+/// Bytes of a log behind its base after which a new base is put.
+const BYTES_MAX: u64 = 256 << 20;
+/// Messages likewise: each costs a NATS server 300 bytes of memory.
+const MESSAGES_MAX: u64 = 100_000;
+/// How often it is looked.
+const LOOKED_EVERY: Duration = Duration::from_secs(30);
+
+/// Puts bases for a map that this node leads.
+pub(super) struct Cutting {
+    joined: Joined,
+    log: Arc<JetStreamLog>,
+    map: Uuid,
+    looked: Instant,
+}
+
+impl Cutting {
+    pub(super) fn of(joined: Joined, log: Arc<JetStreamLog>, map: Uuid) -> Self {
+        Self { joined, log, map, looked: Instant::now() }
+    }
+
+    /// Puts a base where one is due, and cuts the log off at the one before: a node that loads that one just now goes
+    /// on. `needed` is the first message that a live node has still to read.
+    pub(super) async fn look(&mut self, service: &MapService, name: &MapName, needed: u64) {
+        if self.looked.elapsed() < LOOKED_EVERY {
+            return;
+        }
+        self.looked = Instant::now();
+        if let Err(why) = self.cut_if_due(service, name, needed).await {
+            tracing::warn!(map = %name, why, "the log is not cut: it is tried again");
+        }
+    }
+
+    async fn cut_if_due(&self, service: &MapService, name: &MapName, needed: u64) -> Result<(), String> {
+        let (joined, log, map) = (self.joined.clone(), Arc::clone(&self.log), self.map);
+        let found = blocking(move || -> Result<_, String> {
+            let before = joined.pointers.read(map).map_err(|error| error.to_string())?;
+            let used = log.used().map_err(|error| error.to_string())?;
+            let base = before.as_ref().map_or(0, |(base, _)| base.position.sequence);
+            // Of what is kept, the part behind the base, by its share of the messages.
+            let behind = used.last_sequence.saturating_sub(base);
+            let bytes = used.bytes.saturating_mul(behind) / used.messages.max(1);
+            Ok((before, behind >= MESSAGES_MAX || bytes >= BYTES_MAX))
+        });
+        let (before, is_due) = found.await?;
+        if !is_due {
+            return Ok(());
+        }
+        let copy = service.log_base(name).await.map_err(|error| error.to_string())?;
+        let Some((base, file)) = copy else { return Ok(()) };
+        let (joined, log) = (self.joined.clone(), Arc::clone(&self.log));
+        let put = blocking(move || put_base(&joined, &log, map, before.as_ref(), (&base, &file), needed));
+        put.await.map_err(|error| error.to_string())?;
+        tracing::info!(map = %name, "a base was put, and the log cut behind the one before");
+        Ok(())
+    }
+}
+
+fn put_base(
+    joined: &Joined,
+    log: &JetStreamLog,
+    map: Uuid,
+    before: Option<&(Base, u64)>,
+    (base, file): (&Base, &[u8]),
+    needed: u64,
+) -> Result<(), BaseError> {
+    joined.bases.put(map, base, file)?;
+    joined.pointers.change(map, base, before.map_or(0, |(_, revision)| *revision))?;
+    let Some((before, _)) = before else { return Ok(()) };
+    if before.position.sequence > 0 {
+        log.cut_before(before.position.sequence.min(needed))
+            .map_err(|error| BaseError::Unavailable(error.to_string()))?;
+    }
+    joined.bases.delete(map, before)
+}

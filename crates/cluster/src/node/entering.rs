@@ -1,0 +1,107 @@
+//! Maps are entered into the cluster's list and deleted, for the operations of the service.
+
+use std::sync::{Arc, OnceLock};
+
+use mrol_map::map::MapName;
+use mrol_service::{Later, NewMap, Reason, ServiceError, SharedCatalog};
+use tokio::sync::{mpsc, oneshot};
+use uuid::Uuid;
+
+use super::joined::{Joined, blocking, no_quorum};
+use super::keepers::{Wish, remove_log};
+use crate::catalog::CatalogError;
+
+/// Enters maps into the cluster's list and deletes them.
+#[derive(Debug)]
+pub(super) struct Entering {
+    /// None before NATS has answered.
+    pub(super) joined: Arc<OnceLock<Joined>>,
+    pub(super) wishes: mpsc::UnboundedSender<Wish>,
+}
+
+impl Entering {
+    fn joined(&self) -> Result<Joined, ServiceError> {
+        self.joined
+            .get()
+            .cloned()
+            .ok_or_else(|| no_quorum(&"it has not answered since this node was started"))
+    }
+
+    /// Waits until this node has done its part of what is decided already.
+    async fn wait(&self, name: &MapName, uuid: Uuid, is_there: bool) -> Result<(), ServiceError> {
+        let (told, heard) = oneshot::channel();
+        let is_sent = self.wishes.send(Wish { name: name.clone(), uuid, is_there, told }).is_ok();
+        if is_sent && heard.await.is_ok() {
+            return Ok(());
+        }
+        let what = if is_there { "is in the cluster" } else { "is deleted in the cluster" };
+        let message = format!("map {name} {what}, and this node has not followed yet: ask again soon");
+        Err(ServiceError::new(Reason::OutcomeUnknown, message))
+    }
+
+    async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
+        let (joined, of, uuid) = (self.joined()?, name.clone(), new.uuid);
+        let entered = blocking(move || -> Result<Uuid, ServiceError> {
+            // What the list names is there.
+            let NewMap { uuid, base, file } = new;
+            joined.bases.put(uuid, &base, &file).map_err(|error| no_quorum(&error))?;
+            joined.pointers.change(uuid, &base, 0).map_err(|error| no_quorum(&error))?;
+            let entered = joined.catalog.enter(&of, uuid);
+            let may_be_there = match &entered {
+                Ok(there) => *there == uuid,
+                Err(error) => matches!(error, CatalogError::Unknown(_)),
+            };
+            if !may_be_there && let Err(error) = remove_log(&joined, uuid) {
+                tracing::debug!(%error, "what was put for a map that was not entered is still there");
+            }
+            entered.map_err(|error| told(&of, error))
+        });
+        let there = entered.await?;
+        self.wait(name, there, true).await?;
+        Ok(there == uuid)
+    }
+
+    async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
+        let (joined, of) = (self.joined()?, name.clone());
+        let deleted = blocking(move || -> Result<Uuid, ServiceError> {
+            let (listing, _) = joined.catalog.read().map_err(|error| told(&of, error))?;
+            let missing =
+                || ServiceError::new(Reason::MapNotFound, format!("map {of} is none of the cluster's"));
+            let uuid = listing.map(&of).ok_or_else(missing)?.uuid;
+            if !joined.catalog.delete(&of, uuid).map_err(|error| told(&of, error))? {
+                return Err(missing());
+            }
+            // No node can change it any more, even one that has not heard of it.
+            if let Err(error) = remove_log(&joined, uuid) {
+                tracing::debug!(map = %of, error, "its log is still there");
+            }
+            Ok(uuid)
+        });
+        let uuid = deleted.await?;
+        self.wait(name, uuid, false).await
+    }
+}
+
+impl SharedCatalog for Entering {
+    fn enter<'a>(&'a self, name: &'a MapName, new: NewMap) -> Later<'a, Result<bool, ServiceError>> {
+        Box::pin(self.enter_map(name, new))
+    }
+
+    fn delete<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<(), ServiceError>> {
+        Box::pin(self.delete_map(name))
+    }
+}
+
+fn told(name: &MapName, error: CatalogError) -> ServiceError {
+    match error {
+        CatalogError::Unavailable(why) => no_quorum(&why),
+        CatalogError::Unknown(why) => {
+            let message = format!(
+                "NATS did not acknowledge map {name} in its list of maps ({why}): look whether it is there"
+            );
+            ServiceError::new(Reason::OutcomeUnknown, message)
+        }
+        full @ CatalogError::Full => ServiceError::new(Reason::TooManyMaps, full.to_string()),
+        damaged @ CatalogError::Damaged(_) => ServiceError::new(Reason::CatalogBusy, damaged.to_string()),
+    }
+}

@@ -1,0 +1,145 @@
+//! A node's beats, and what it sees of those of the others.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use mrol_service::replication::NodeName;
+use mrol_service::{Lead, MapService, SharedMap};
+use tokio::sync::watch;
+use uuid::Uuid;
+
+use super::joined::Joined;
+use super::settings::NodeSettings;
+use super::view::{Seen, View};
+use crate::beat::{Beat, MapHead};
+use crate::beats::{BEAT_EVERY, NodeBeat};
+use crate::forwarder::Forwarder;
+use crate::liveness::Liveness;
+
+/// How long a port of a silent node may take to answer.
+const PORT_WITHIN: Duration = Duration::from_millis(200);
+
+/// A node's beats. They have a thread of their own, so that nothing else that the node does delays them.
+pub(super) struct Heart {
+    pub(super) settings: NodeSettings,
+    pub(super) joined: Joined,
+    pub(super) service: MapService,
+    /// Is told the addresses of the others.
+    pub(super) forwarder: Arc<Forwarder>,
+    pub(super) view: watch::Sender<View>,
+}
+
+impl Heart {
+    /// Beats until it is told to end.
+    pub(super) fn beat(self, end: &Receiver<()>) {
+        let mut liveness = Liveness::new(self.settings.name.clone());
+        let (mut beats, mut is_silent) = (0, false);
+        loop {
+            let begun = Instant::now();
+            match self.beat_once(&mut liveness, &mut beats) {
+                Ok(()) if is_silent => {
+                    is_silent = false;
+                    tracing::info!("NATS acknowledges beats again");
+                }
+                Ok(()) => {}
+                Err(error) if !is_silent => {
+                    is_silent = true;
+                    tracing::warn!(error, "NATS does not acknowledge this node's beat: it takes no map over");
+                }
+                Err(_) => {}
+            }
+            let rest = BEAT_EVERY.saturating_sub(begun.elapsed());
+            if !matches!(end.recv_timeout(rest), Err(RecvTimeoutError::Timeout)) {
+                return;
+            }
+        }
+    }
+
+    fn beat_once(&self, liveness: &mut Liveness, beats: &mut u64) -> Result<(), String> {
+        let text = |error: crate::bucket::BucketError| error.to_string();
+        let revision = self.joined.beats.put(&self.settings.name, &self.own_beat()).map_err(text)?;
+        liveness.own_beat_acknowledged(revision);
+        *beats += 1;
+        let read = self.joined.beats.read().map_err(text)?;
+        let revisions = read.iter().map(|beat| (beat.node.clone(), beat.revision)).collect();
+        if !liveness.beats_read(&revisions) {
+            // Of a server that lags.
+            return Ok(());
+        }
+        let others: Vec<NodeBeat> = read.into_iter().filter(|beat| beat.node != self.settings.name).collect();
+        let silent: Vec<NodeName> = liveness.silent().cloned().collect();
+        for other in others.iter().filter(|other| silent.contains(&other.node)) {
+            if is_refused(&other.beat.grpc) {
+                liveness.port_refused(&other.node);
+            }
+        }
+        let seen = |NodeBeat { node, beat, .. }: NodeBeat| {
+            let is_live = !liveness.is_gone(&node);
+            (node, Seen { beat, is_live })
+        };
+        let now = View { beats: *beats, others: others.into_iter().map(seen).collect() };
+        tell_changes(&self.view.borrow(), &now);
+        let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
+        self.forwarder.set_addresses(grpc.collect());
+        self.view.send_replace(now);
+        Ok(())
+    }
+
+    fn own_beat(&self) -> Beat {
+        let NodeSettings { http, grpc, version, record_version, .. } = self.settings.clone();
+        let free_bytes = self.service.measure().disk_free_bytes.unwrap_or(u64::MAX);
+        let maps = self.service.shared_maps().into_iter().filter_map(head_of).collect();
+        Beat { http, grpc, version, record_version, maps, free_bytes }
+    }
+}
+
+fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
+    let Lead::Shared { is_here, epoch, sequence, .. } = map.lead else { return None };
+    let is_parted = map.failure.is_some();
+    let revision = map.version.revision;
+    Some((map.version.map_uuid, MapHead { revision, epoch, sequence, leads: is_here, is_parted }))
+}
+
+/// Tells the log which nodes have come and gone.
+fn tell_changes(before: &View, now: &View) {
+    let live = |view: &View| -> BTreeMap<NodeName, bool> {
+        view.others.iter().map(|(node, seen)| (node.clone(), seen.is_live)).collect()
+    };
+    let (before, now) = (live(before), live(now));
+    for (node, is_live) in now {
+        match (before.get(&node), is_live) {
+            (Some(true), false) => tracing::warn!(%node, "a node is gone"),
+            (Some(false) | None, true) => tracing::info!(%node, "a node is there"),
+            _ => {}
+        }
+    }
+}
+
+/// True where nothing listens at an address: more than that it does not answer.
+fn is_refused(address: &str) -> bool {
+    let host = address.split_once("://").map_or(address, |(_, host)| host);
+    let resolved = host.to_socket_addrs().ok().and_then(|mut all| all.next());
+    let connected = resolved.map(|resolved| TcpStream::connect_timeout(&resolved, PORT_WITHIN));
+    matches!(connected, Some(Err(error)) if error.kind() == ErrorKind::ConnectionRefused)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    #[test]
+    fn a_port_refuses_where_nothing_listens() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("http://{}", listener.local_addr().unwrap());
+        assert!(!is_refused(&address));
+        drop(listener);
+        assert!(is_refused(&address));
+        assert!(!is_refused("http://no-such-host.invalid:1"), "it is not known");
+    }
+}

@@ -1,0 +1,189 @@
+//! Keeps this node's copy of one map.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mrol_map::map::MapName;
+use mrol_service::replication::NodeName;
+use mrol_service::{Lead, MapService, Reason, ServiceError};
+use tokio::sync::watch;
+use uuid::Uuid;
+
+use super::choice::{Choice, Known, choose};
+use super::cutting::Cutting;
+use super::joined::{Joined, blocking, no_quorum};
+use super::view::View;
+use crate::following::Following;
+use crate::jetstream_log::JetStreamLog;
+
+/// Pause before a copy is tried again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Keeps this node's copy of one map: takes it in where it has none, shares it by its log, and leads it where it is to.
+pub(super) struct Keeper {
+    pub(super) node: NodeName,
+    pub(super) service: MapService,
+    pub(super) joined: Joined,
+    pub(super) name: MapName,
+    pub(super) uuid: Uuid,
+    /// The node that is to lead the map whenever it can.
+    pub(super) wished: watch::Receiver<Option<NodeName>>,
+    pub(super) view: watch::Receiver<View>,
+}
+
+impl Keeper {
+    /// Keeps it until it is aborted.
+    pub(super) async fn keep(mut self) {
+        let mut last_said = None;
+        let log = loop {
+            let error = match self.share().await {
+                Ok(log) => break log,
+                Err(error) => error,
+            };
+            if last_said.as_ref() != Some(&error.message) {
+                tracing::warn!(map = %self.name, why = error.message, "this node has no copy of the map that follows its log");
+                last_said = Some(error.message);
+            }
+            tokio::time::sleep(PAUSE).await;
+        };
+        let _following = Following::begin(self.service.clone(), self.name.clone(), &log);
+        let Ok(lead) = self.service.lead_of(&self.name).await else { return };
+        self.lead_where_due(lead, log).await;
+    }
+
+    /// Takes a copy in where there is none, and shares it by its log.
+    async fn share(&self) -> Result<Arc<JetStreamLog>, ServiceError> {
+        match self.service.uuid_of_copy(&self.name).await? {
+            Some(uuid) if uuid == self.uuid => {}
+            Some(other) => {
+                let message = format!(
+                    "map {} of this node is another than the cluster's: {other}, not {}; delete it here, or take it in under \
+                     another name (`mrol cluster adopt`)",
+                    self.name, self.uuid
+                );
+                return Err(ServiceError::new(Reason::MapExists, message));
+            }
+            None => self.load_base(false).await?,
+        }
+        let (engine, uuid) = (self.joined.engine.clone(), self.uuid);
+        let log = blocking(move || JetStreamLog::create(&engine, uuid)).await;
+        let log = Arc::new(log.map_err(|error| no_quorum(&error))?);
+        let shared = self.service.share_map(&self.name, log.clone(), self.node.clone()).await;
+        match shared {
+            // It follows once the log answers, or tells that it has parted from it.
+            Err(error) if error.reason == Reason::NoQuorum => Ok(log),
+            Err(error) if error.reason == Reason::HistoriesDiffer => {
+                self.load_if_behind(&log).await?;
+                Ok(log)
+            }
+            shared => shared.map(|_| log),
+        }
+    }
+
+    /// Loads the base where this node's copy is further behind than the log begins.
+    async fn load_if_behind(&self, log: &Arc<JetStreamLog>) -> Result<(), ServiceError> {
+        let (pointers, uuid) = (self.joined.pointers.clone(), self.uuid);
+        let base = blocking(move || pointers.read(uuid)).await.map_err(|error| no_quorum(&error))?;
+        let own = self.service.version_of(&self.name).await?.revision;
+        let Some((base, _)) = base.filter(|(base, _)| base.revision > own) else { return Ok(()) };
+        tracing::warn!(map = %self.name, own, base = base.revision, "this node's copy is behind where the log begins: the \
+                       base takes its place");
+        self.load_base(true).await?;
+        match self.service.share_map(&self.name, log.clone(), self.node.clone()).await {
+            Err(error) if error.reason != Reason::NoQuorum => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    async fn load_base(&self, replace: bool) -> Result<(), ServiceError> {
+        let (joined, uuid) = (self.joined.clone(), self.uuid);
+        let fetched = blocking(move || {
+            let base = joined.pointers.read(uuid)?;
+            base.map(|(base, _)| joined.bases.fetch(uuid, &base)).transpose()
+        });
+        let file = fetched.await.map_err(|error| no_quorum(&error))?;
+        let file = file.ok_or_else(|| no_quorum(&format!("map {} has no base", self.name)))?;
+        self.service.copy_map(self.name.clone(), uuid, Bytes::from(file), replace).await.map(drop)
+    }
+
+    /// Looks with each beat, and whenever the log names another node, whether this one is to lead.
+    async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) {
+        let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid);
+        let (mut waited_since, mut sequences) = (None, [0; 2]);
+        loop {
+            let view = self.view.borrow_and_update().clone();
+            let now = lead.borrow_and_update().clone();
+            let Ok(version) = self.service.version_of(&self.name).await else { return };
+            let leader_is_seen = match &now {
+                Lead::Shared { is_here: true, .. } => true,
+                Lead::Shared { leader: Some(leader), .. } => {
+                    view.holders(self.uuid).any(|(node, _)| node == leader)
+                }
+                _ => false,
+            };
+            let since = *waited_since.get_or_insert(view.beats);
+            if leader_is_seen {
+                waited_since = None;
+            }
+            let wished = self.wished.borrow_and_update().clone();
+            let known = Known {
+                own: &self.node,
+                map: self.uuid,
+                revision: version.revision,
+                sequence_before: sequences[0],
+                lead: &now,
+                wished: wished.as_ref(),
+                view: &view,
+                waited: view.beats - since,
+            };
+            let choice = choose(&known);
+            self.act(choice, &view).await;
+            if let Lead::Shared { is_here: true, sequence, .. } = &now {
+                let heads = view.holders(self.uuid).map(|(_, head)| head.sequence);
+                let needed = heads.min().unwrap_or(*sequence);
+                cutting.look(&self.service, &self.name, needed.min(*sequence)).await;
+            }
+            tokio::select! {
+                changed = self.view.changed() => {
+                    if changed.is_err() {
+                        return;
+                    }
+                    let Lead::Shared { sequence, .. } = &*lead.borrow() else { continue };
+                    sequences = [sequences[1], *sequence];
+                }
+                () = leader_changed(&mut lead, &now) => {}
+                _ = self.wished.changed() => {}
+            }
+        }
+    }
+
+    async fn act(&self, choice: Choice, view: &View) {
+        let done = match choice {
+            Choice::Stay => return,
+            Choice::Claim => {
+                let live = view.holders(self.uuid).map(|(node, head)| (node.clone(), head.revision));
+                self.service.lead_map(&self.name, live.collect()).await
+            }
+            Choice::HandOver(node) => {
+                tracing::info!(map = %self.name, %node, "hands over");
+                self.service.hand_map_over(&self.name, node).await
+            }
+        };
+        if let Err(error) = done {
+            tracing::warn!(map = %self.name, why = error.message, "the lead stays where it is");
+        }
+    }
+}
+
+/// Waits until the log names another node, or this one has taken over or lost the lead.
+async fn leader_changed(lead: &mut watch::Receiver<Lead>, before: &Lead) {
+    let of = |lead: &Lead| match lead {
+        Lead::Shared { leader, is_here, .. } => Some((leader.clone(), *is_here)),
+        _ => None,
+    };
+    let before = of(before);
+    if lead.wait_for(|lead| of(lead) != before).await.is_err() {
+        std::future::pending().await
+    }
+}

@@ -1,0 +1,211 @@
+//! One keeper for each map of the cluster's list.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use mrol_map::map::MapName;
+use mrol_service::replication::NodeName;
+use mrol_service::{Lead, MapService, Reason, ServiceError};
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::task::JoinHandle;
+use uuid::Uuid;
+
+use super::joined::{Joined, blocking};
+use super::keeper::Keeper;
+use super::view::View;
+use crate::catalog::Listing;
+use crate::jetstream_log::JetStreamLog;
+
+/// How long a copy that an operation waits for may take to come or to go.
+const DONE_WITHIN: Duration = Duration::from_secs(20);
+/// How often it is looked for it.
+const LOOKED_EVERY: Duration = Duration::from_millis(10);
+/// How long a map that was deleted stays listed as such, at least.
+const DELETED_FOR: Duration = Duration::from_secs(60);
+
+/// What an operation waits for, once the list says so: a copy of a map that some node leads, or that there is none.
+#[derive(Debug)]
+pub(super) struct Wish {
+    pub(super) name: MapName,
+    pub(super) uuid: Uuid,
+    /// True of a map that was entered, false of one that was deleted.
+    pub(super) is_there: bool,
+    pub(super) told: oneshot::Sender<()>,
+}
+
+/// One keeper for each map of the cluster's list.
+pub(super) struct Keepers {
+    node: NodeName,
+    service: MapService,
+    joined: Joined,
+    view: watch::Receiver<View>,
+    kept: BTreeMap<MapName, Kept>,
+    /// Maps that were deleted, since when this node knows.
+    deleted: BTreeMap<Uuid, Instant>,
+}
+
+struct Kept {
+    uuid: Uuid,
+    wished: watch::Sender<Option<NodeName>>,
+    task: JoinHandle<()>,
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+impl Keepers {
+    pub(super) fn new(
+        node: NodeName,
+        service: MapService,
+        joined: Joined,
+        view: watch::Receiver<View>,
+    ) -> Self {
+        Self { node, service, joined, view, kept: BTreeMap::new(), deleted: BTreeMap::new() }
+    }
+
+    /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
+    pub(super) async fn keep(mut self, mut wishes: mpsc::UnboundedReceiver<Wish>) {
+        let mut hints = self.joined.catalog.hints(&self.joined.engine);
+        let mut view = self.view.clone();
+        loop {
+            self.follow_list().await;
+            tokio::select! {
+                wish = wishes.recv() => match wish {
+                    Some(wish) => {
+                        self.follow_list().await;
+                        tokio::spawn(fulfil(self.service.clone(), wish));
+                    }
+                    None => return,
+                },
+                _ = view.changed() => self.forget_deleted().await,
+                () = hints.next() => {}
+            }
+        }
+    }
+
+    async fn follow_list(&mut self) {
+        let catalog = self.joined.catalog.clone();
+        match blocking(move || catalog.read()).await {
+            Ok((listing, _)) => self.follow(&listing).await,
+            Err(error) => tracing::debug!(%error, "the list of maps was not read"),
+        }
+    }
+
+    async fn follow(&mut self, listing: &Listing) {
+        let now = Instant::now();
+        for uuid in listing.deleted() {
+            self.deleted.entry(uuid).or_insert(now);
+        }
+        let is_other =
+            |name: &MapName, kept: &Kept| listing.map(name).is_none_or(|entry| entry.uuid != kept.uuid);
+        let ended: Vec<_> = self
+            .kept
+            .iter()
+            .filter(|(name, kept)| is_other(name, kept))
+            .map(|(name, _)| name.clone())
+            .collect();
+        for name in ended {
+            drop(self.kept.remove(&name));
+        }
+        for map in self.service.shared_maps() {
+            if listing.is_deleted(map.version.map_uuid) {
+                self.drop_copy(&map.name, map.version.map_uuid).await;
+            }
+        }
+        for (name, entry) in listing.maps() {
+            let wished = entry.leader();
+            match self.kept.get(&name) {
+                Some(kept) => {
+                    kept.wished.send_if_modified(|there| std::mem::replace(there, wished.clone()) != wished);
+                }
+                None => {
+                    let kept = self.begin(&name, entry.uuid, wished);
+                    self.kept.insert(name, kept);
+                }
+            }
+        }
+    }
+
+    fn begin(&self, name: &MapName, uuid: Uuid, wished: Option<NodeName>) -> Kept {
+        let (wished, heard) = watch::channel(wished);
+        let keeper = Keeper {
+            node: self.node.clone(),
+            service: self.service.clone(),
+            joined: self.joined.clone(),
+            name: name.clone(),
+            uuid,
+            wished: heard,
+            view: self.view.clone(),
+        };
+        Kept { uuid, wished, task: tokio::spawn(keeper.keep()) }
+    }
+
+    async fn drop_copy(&self, name: &MapName, uuid: Uuid) {
+        match self.service.drop_copy(name, uuid).await {
+            Ok(()) => tracing::info!(map = %name, %uuid, "was deleted in the cluster, and here"),
+            Err(error) => tracing::warn!(map = %name, %error, "was deleted in the cluster, and not here yet"),
+        }
+    }
+
+    /// Takes away what is left at NATS of maps that were deleted, and forgets those that no node has a copy of.
+    async fn forget_deleted(&mut self) {
+        let view = self.view.borrow().clone();
+        let is_held = |uuid: &Uuid| view.others.values().any(|seen| seen.beat.maps.contains_key(uuid));
+        // One of the nodes is enough.
+        let is_first = view.others.iter().all(|(node, seen)| !seen.is_live || *node > self.node);
+        let due = |(uuid, since): (&Uuid, &Instant)| {
+            (is_first && since.elapsed() > DELETED_FOR && !is_held(uuid)).then_some(*uuid)
+        };
+        let due: BTreeSet<Uuid> = self.deleted.iter().filter_map(due).collect();
+        if due.is_empty() {
+            return;
+        }
+        let (joined, forgotten) = (self.joined.clone(), due.clone());
+        let cleared = blocking(move || -> Result<(), String> {
+            due.iter().try_for_each(|uuid| remove_log(&joined, *uuid))?;
+            joined.catalog.forget(&due).map_err(|error| error.to_string())
+        });
+        match cleared.await {
+            Ok(()) => self.deleted.retain(|uuid, _| !forgotten.contains(uuid)),
+            Err(error) => tracing::debug!(error, "what is left of maps that were deleted is not gone yet"),
+        }
+    }
+}
+
+/// Removes what NATS has of a map: its log, its base and what points there.
+pub(super) fn remove_log(joined: &Joined, uuid: Uuid) -> Result<(), String> {
+    JetStreamLog::delete(&joined.engine, uuid).map_err(|error| error.to_string())?;
+    if let Some((base, revision)) = joined.pointers.read(uuid).map_err(|error| error.to_string())? {
+        joined.bases.delete(uuid, &base).map_err(|error| error.to_string())?;
+        joined.pointers.forget(uuid, revision).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+/// Waits for what an operation wishes; where it does not come in time, the operation hears nothing.
+async fn fulfil(service: MapService, wish: Wish) {
+    let until = Instant::now() + DONE_WITHIN;
+    while Instant::now() < until {
+        match is_fulfilled(&service, &wish).await {
+            Ok(true) => {
+                _ = wish.told.send(());
+                return;
+            }
+            Err(error) if error.reason != Reason::MapNotFound => return,
+            _ => tokio::time::sleep(LOOKED_EVERY).await,
+        }
+    }
+}
+
+async fn is_fulfilled(service: &MapService, wish: &Wish) -> Result<bool, ServiceError> {
+    let has_copy = service.uuid_of_copy(&wish.name).await? == Some(wish.uuid);
+    if !wish.is_there || !has_copy {
+        return Ok(wish.is_there == has_copy);
+    }
+    let lead = service.lead_of(&wish.name).await?;
+    let is_led = matches!(&*lead.borrow(), Lead::Shared { leader: Some(_), .. });
+    Ok(is_led)
+}

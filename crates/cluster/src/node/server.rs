@@ -1,0 +1,193 @@
+//! A node of the cluster.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::mpsc as std_mpsc;
+use std::sync::{Arc, OnceLock};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mrol_service::replication::NodeName;
+use mrol_service::{Cluster, Forward, Lead, MapService};
+use parking_lot::Mutex;
+use tokio::sync::{mpsc, watch};
+use tokio::task;
+
+use super::entering::Entering;
+use super::heart::Heart;
+use super::joined::{Joined, NotJoined, blocking};
+use super::keepers::{Keepers, Wish};
+use super::settings::NodeSettings;
+use super::view::View;
+use crate::engine::ConnectError;
+use crate::forwarder::Forwarder;
+
+/// Pause before NATS is tried again.
+const CONNECT_AGAIN: Duration = Duration::from_secs(1);
+/// How long a node that leaves waits for the others to take its maps over, all in all.
+const LEAVING_MAX: Duration = Duration::from_secs(5);
+
+/// A node of the cluster: a server that shares its maps with others. It is made before the server's maps are opened,
+/// whose operations enter maps by it, and begins to work with [`Node::begin`].
+pub struct Node {
+    settings: NodeSettings,
+    forwarder: Arc<Forwarder>,
+    joined: Arc<OnceLock<Joined>>,
+    view: watch::Sender<View>,
+    wishes: mpsc::UnboundedSender<Wish>,
+    heard: Mutex<Option<mpsc::UnboundedReceiver<Wish>>>,
+    work: Mutex<Option<task::JoinHandle<()>>>,
+    heart: Mutex<Option<(std_mpsc::Sender<()>, JoinHandle<()>)>>,
+}
+
+/// What a node knows of the cluster.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// True once NATS has acknowledged a beat of this node.
+    pub is_joined: bool,
+    /// The gRPC addresses of the other nodes, those that are gone among them.
+    pub grpc: BTreeMap<NodeName, String>,
+    /// The nodes that are gone.
+    pub gone: Vec<NodeName>,
+}
+
+impl Node {
+    /// A node that does nothing yet, and asks others by `forwarder`.
+    pub fn new(settings: NodeSettings, forwarder: Forwarder) -> Arc<Self> {
+        let (wishes, heard) = mpsc::unbounded_channel();
+        Arc::new(Self {
+            settings,
+            forwarder: Arc::new(forwarder),
+            joined: Arc::default(),
+            view: watch::Sender::new(View::default()),
+            wishes,
+            heard: Mutex::new(Some(heard)),
+            work: Mutex::new(None),
+            heart: Mutex::new(None),
+        })
+    }
+
+    /// Its part in the operations of the service.
+    pub fn cluster(&self) -> Cluster {
+        Cluster {
+            node: self.settings.name.clone(),
+            forward: Arc::clone(&self.forwarder) as Arc<dyn Forward>,
+            catalog: Arc::new(Entering { joined: Arc::clone(&self.joined), wishes: self.wishes.clone() }),
+        }
+    }
+
+    /// Begins to work, once the maps of `service` are open: waits for NATS, for as long as that takes.
+    pub fn begin(self: &Arc<Self>, service: MapService) {
+        let this = Arc::clone(self);
+        *self.work.lock() = Some(tokio::spawn(async move { this.work(service).await }));
+    }
+
+    async fn work(self: Arc<Self>, service: MapService) {
+        let joined = self.join().await;
+        let Some(heard) = self.heard.lock().take() else { return };
+        drop(self.joined.set(joined.clone()));
+        let (end, ended) = std_mpsc::channel();
+        let heart = Heart {
+            settings: self.settings.clone(),
+            joined: joined.clone(),
+            service: service.clone(),
+            forwarder: Arc::clone(&self.forwarder),
+            view: self.view.clone(),
+        };
+        match std::thread::Builder::new().name("beats".to_owned()).spawn(move || heart.beat(&ended)) {
+            Ok(thread) => *self.heart.lock() = Some((end, thread)),
+            Err(error) => {
+                return tracing::error!(%error, "no thread for the node's beats: it takes no part in the cluster");
+            }
+        }
+        let keepers = Keepers::new(self.settings.name.clone(), service, joined, self.view.subscribe());
+        keepers.keep(heard).await;
+    }
+
+    /// Connects, again and again. What is wrong in the settings is said each time.
+    async fn join(&self) -> Joined {
+        let mut last_said = String::new();
+        loop {
+            let settings = self.settings.clone();
+            let error = match blocking(move || Joined::join(&settings)).await {
+                Ok(joined) => return joined,
+                Err(error) => error,
+            };
+            let (is_patient, said) = (is_patient(&error), error.to_string());
+            if said != last_said {
+                match is_patient {
+                    true => tracing::warn!(why = said, "waits for NATS: maps take no changes before"),
+                    false => {
+                        tracing::error!(why = said, "cannot join the cluster: maps take no changes before")
+                    }
+                }
+                last_said = said;
+            }
+            tokio::time::sleep(CONNECT_AGAIN).await;
+        }
+    }
+
+    /// What it knows of the cluster.
+    pub fn status(&self) -> NodeStatus {
+        let view = self.view.borrow();
+        let others = view.others.iter();
+        NodeStatus {
+            is_joined: view.beats > 0,
+            grpc: others.clone().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone())).collect(),
+            gone: others.filter(|(_, seen)| !seen.is_live).map(|(node, _)| node.clone()).collect(),
+        }
+    }
+
+    /// Hands the maps that it leads over to others, waits until those have taken over, for some seconds at most, and
+    /// ends its work: what is asked of it from then on goes on to them.
+    pub async fn leave(&self, service: &MapService) {
+        let until = Instant::now() + LEAVING_MAX;
+        let led = |service: &MapService| {
+            let maps = service.shared_maps().into_iter();
+            maps.filter(|map| matches!(map.lead, Lead::Shared { is_here: true, .. })).collect::<Vec<_>>()
+        };
+        let mut handed = Vec::new();
+        for map in led(service) {
+            let view = self.view.borrow().clone();
+            let holders = view.holders(map.version.map_uuid);
+            let Some((node, _)) = holders.max_by_key(|(_, head)| head.sequence) else { continue };
+            let over = service.hand_map_over(&map.name, node.clone());
+            match tokio::time::timeout(until.saturating_duration_since(Instant::now()), over).await {
+                Ok(Ok(_)) => handed.push(map.name),
+                Ok(Err(error)) => tracing::warn!(map = %map.name, %error, "was not handed over"),
+                Err(_) => break,
+            }
+        }
+        if !handed.is_empty() {
+            tracing::info!(maps = handed.len(), "handed over");
+        }
+    }
+
+    /// Ends its work.
+    pub async fn end(&self) {
+        let work = self.work.lock().take();
+        work.inspect(task::JoinHandle::abort);
+        let heart = self.heart.lock().take();
+        if let Some((end, thread)) = heart {
+            drop(end);
+            // It may wait for NATS.
+            drop(tokio::time::timeout(CONNECT_AGAIN, task::spawn_blocking(|| thread.join())).await);
+        }
+    }
+}
+
+/// True where waiting helps.
+fn is_patient(error: &NotJoined) -> bool {
+    match error {
+        NotJoined::Connect(error) => {
+            matches!(error, ConnectError::NoServer { .. } | ConnectError::NoQuorum { .. })
+        }
+        NotJoined::Stream(_) => true,
+    }
+}
+
+impl fmt::Debug for Node {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Node").field(&self.settings.name).finish()
+    }
+}

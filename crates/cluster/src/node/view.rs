@@ -1,0 +1,41 @@
+//! What a node sees of the others.
+
+use std::collections::BTreeMap;
+
+use mrol_service::replication::NodeName;
+use uuid::Uuid;
+
+use crate::beat::{Beat, MapHead};
+
+/// What a node sees of the others after a beat of its own was acknowledged.
+#[derive(Debug, Clone, Default)]
+pub(super) struct View {
+    /// Own beats that were acknowledged.
+    pub(super) beats: u64,
+    /// The other nodes, those that are gone among them.
+    pub(super) others: BTreeMap<NodeName, Seen>,
+}
+
+/// Another node.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    /// Its last beat.
+    pub(super) beat: Beat,
+    /// False once it is gone.
+    pub(super) is_live: bool,
+}
+
+impl View {
+    /// The other nodes that are live and hold a map of which they take changes, with how far they are.
+    pub(super) fn holders(&self, map: Uuid) -> impl Iterator<Item = (&NodeName, &MapHead)> {
+        let live = self.others.iter().filter(|(_, seen)| seen.is_live);
+        live.filter_map(move |(node, seen)| {
+            Some((node, seen.beat.maps.get(&map).filter(|it| !it.is_parted)?))
+        })
+    }
+
+    /// True of another node that is live.
+    pub(super) fn is_live(&self, node: &NodeName) -> bool {
+        self.others.get(node).is_some_and(|seen| seen.is_live)
+    }
+}
