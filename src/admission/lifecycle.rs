@@ -1,5 +1,8 @@
 //! How a server goes down: what is in hand is finished within a bound, and nothing new begins.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tokio_util::task::task_tracker::TaskTrackerToken;
@@ -18,6 +21,8 @@ pub struct Lifecycle {
     leaving: CancellationToken,
     draining: CancellationToken,
     cut: CancellationToken,
+    /// True while a node of a cluster is behind the others.
+    is_behind: Arc<AtomicBool>,
     in_flight: TaskTracker,
 }
 
@@ -30,6 +35,17 @@ impl Lifecycle {
     /// Says from now on that the server is not ready, while it serves on: balancers and probes need a while to see it.
     pub fn leave(&self) {
         self.leaving.cancel();
+    }
+
+    /// True of a node of a cluster that has not joined it, or is too far behind the others: it serves, and whoever can
+    /// is to ask another.
+    pub fn is_behind(&self) -> bool {
+        self.is_behind.load(Ordering::Relaxed)
+    }
+
+    /// Says whether it is.
+    pub fn set_behind(&self, is_behind: bool) {
+        self.is_behind.store(is_behind, Ordering::Relaxed);
     }
 
     /// True once new requests are refused.

@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::settings::Config;
 use super::{
-    AccessConfig, AdminConfig, AlignmentConfig, FilterConfig, ListenerConfig, LogConfig, MapsConfig,
-    RobotConfig,
+    AccessConfig, AdminConfig, AlignmentConfig, ClusterConfig, FilterConfig, ListenerConfig, LogConfig,
+    MapsConfig, RobotConfig,
 };
 use super::{StoreConfig, ThreadsConfig, TlsConfig};
 use mrol_service::{EVERY_ROBOT, Limits, Setting, SettingKind, Unit};
@@ -25,6 +25,7 @@ fn sections() -> Vec<Section> {
         ("admin", AdminConfig::settings()),
         ("access", AccessConfig::settings()),
         ("tls", TlsConfig::settings()),
+        ("cluster", ClusterConfig::settings()),
         ("log", LogConfig::settings()),
         ("store", StoreConfig::settings()),
         ("maps", MapsConfig::settings()),

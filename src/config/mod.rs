@@ -2,6 +2,7 @@
 
 mod access;
 mod admin;
+mod cluster;
 mod documented;
 mod error;
 mod filter;
@@ -20,6 +21,9 @@ mod variables;
 
 pub use access::AccessConfig;
 pub use admin::AdminConfig;
+pub use cluster::ClusterConfig;
+#[cfg(feature = "cluster")]
+pub(crate) use cluster::advertised;
 pub use error::ConfigError;
 pub use filter::FilterConfig;
 pub use listener::ListenerConfig;

@@ -2,6 +2,7 @@
 
 use super::access::AccessConfig;
 use super::admin::AdminConfig;
+use super::cluster::ClusterConfig;
 use super::error::ConfigError;
 use super::filter::FilterConfig;
 use super::limits;
@@ -37,6 +38,8 @@ const DRAIN_DELAY_MAX_S: f64 = 3600.0;
 pub struct Config {
     /// Where maps are kept across restarts; an empty path, `\"\"`, keeps them in memory only. `./mrol-data`.
     pub data_dir: PathBuf,
+    /// Settings of a node of a cluster.
+    pub cluster: ClusterConfig,
     /// Settings of the store.
     pub store: StoreConfig,
     /// Which maps are kept in memory.
@@ -78,6 +81,7 @@ impl Default for Config {
         let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into(), socket: None };
         Self {
             data_dir: "./mrol-data".into(),
+            cluster: ClusterConfig::default(),
             store: StoreConfig::default(),
             maps: MapsConfig::default(),
             drain_seconds: 10,
@@ -106,6 +110,7 @@ impl Config {
         }
         limits::check(&self.limits)?;
         self.access.check()?;
+        self.cluster.check(self.access.keys_file.is_some(), self.data_dir.as_os_str().is_empty())?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }
@@ -136,6 +141,7 @@ impl Config {
             self.maps.out_of_range(),
             self.admin.out_of_range(),
             self.access.out_of_range(),
+            self.cluster.out_of_range(),
             self.tls.out_of_range(),
             self.threads.out_of_range(),
             self.filter.out_of_range(),
@@ -199,7 +205,8 @@ impl Config {
             stationary: StationarySettings::default(),
             robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.of_robot())).collect(),
             filter: FilterSettings { hashes, bits_per_key },
-            sleep_after: self.maps.sleep_after(),
+            // A map that nodes share follows its log.
+            sleep_after: self.maps.sleep_after().filter(|_| !self.cluster.is_used()),
             cluster: None,
         }
     }

@@ -26,6 +26,8 @@ EXAMPLES:
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
   mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
+  mrol serve --cluster nats://10.0.0.1:4222,nats://10.0.0.2:4222 --node n1 --http-listen 10.0.0.1:7333 \\
+      --grpc-listen 10.0.0.1:7334                share the maps with other nodes (docs/guide/cluster.md)
   MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable: limits.maps_max, with two underscores
 
 The first line on standard output has the addresses; the log goes to standard error. Settings come from defaults,
@@ -83,6 +85,13 @@ pub struct ServeOptions {
     /// Listen beyond loopback without keys: whoever reaches the ports may do everything. Not with --keys-file
     #[arg(long)]
     insecure_open: bool,
+    /// Be a node of a cluster, which shares its maps with others by way of these NATS servers: nats://HOST:PORT,...
+    /// Needs --node, and a data folder
+    #[arg(long, value_name = "URLS", value_delimiter = ',')]
+    cluster: Option<Vec<String>>,
+    /// The name of this node, which no other has
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
     /// How log lines are written: text or json [default: text]
     #[arg(long, value_name = "FORMAT", value_parser = ["text", "json"])]
     log_format: Option<String>,
@@ -159,6 +168,7 @@ impl ServeOptions {
             "grpc": {"listen": self.grpc_listen, "socket": self.grpc_socket},
             "admin": {"listen": self.admin_listen},
             "access": {"keys_file": self.keys_file, "open": self.insecure_open.then_some(true)},
+            "cluster": {"nats": self.cluster, "node": self.node},
             "tls": {"certificate": self.tls_certificate, "key": self.tls_key, "client_ca": self.tls_client_ca},
             "log": {"format": self.log_format, "level": self.log_level},
             "store": {

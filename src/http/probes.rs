@@ -22,7 +22,7 @@ use mrol_store::Opened;
 pub(super) struct ReadyResponse {
     /// True where they are.
     pub(super) ready: bool,
-    /// Why not: `starting` or `draining`.
+    /// Why not: `starting`, `draining` or `behind`.
     #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) reason: Option<&'static str>,
@@ -81,7 +81,8 @@ pub(super) async fn live(NoParams: NoParams) -> &'static str {
 /// While maps are being opened, those that are open are served: a request for another one waits for it. Maps
 /// that take no changes since their journal failed are named to whoever may name them; they answer queries all
 /// the same. So are maps that could not be opened, with what helps: the others are served. A
-/// server whose disk or memory is nearly full stays ready.
+/// server whose disk or memory is nearly full stays ready. A node of a cluster that has not joined it, or is behind the
+/// others for longer than `cluster.lag_max_s`, is not; it answers all the same.
 #[utoipa::path(
     get,
     path = "/readyz",
@@ -104,6 +105,9 @@ pub(super) async fn ready(
         (StatusCode::SERVICE_UNAVAILABLE, Json(body)).into_response()
     } else if let Some(opened) = service.opening() {
         ReadyResponse::starting(opened)
+    } else if adapter.admission.lifecycle().is_behind() {
+        let body = ReadyResponse { reason: Some("behind"), ..ReadyResponse::default() };
+        (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], Json(body)).into_response()
     } else {
         let read_only = service.read_only_maps().into_iter();
         let body = ReadyResponse {

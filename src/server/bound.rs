@@ -15,6 +15,7 @@ use super::background::keep_house;
 use super::endpoint::Endpoint;
 use super::files::Warnings;
 use super::listener::{Accepting, TcpSocket};
+use super::membership::Membership;
 use super::opening::{Opening, Wanted, panicked};
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
@@ -50,6 +51,7 @@ pub struct Server {
     access: Access,
     tls: Option<Tls>,
     service: MapService,
+    membership: Membership,
     recorder: RequestRecorder,
     lifecycle: Lifecycle,
     http: TcpSocket,
@@ -86,6 +88,10 @@ impl Server {
         let observers: Vec<Arc<dyn Observer>> = vec![Arc::new(metrics.clone()), Arc::new(audit.clone())];
         let settings = ServiceSettings { gauges: Some(gauges), observers, ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
+        // That of gRPC too, since a node tells the others where it is.
+        let grpc = TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?;
+        let (membership, access) = Membership::of(&config, (http.address, grpc.address), access)?;
+        let settings = ServiceSettings { cluster: membership.cluster(), ..settings };
         let wanted = Wanted::default();
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
         let admin =
@@ -111,13 +117,14 @@ impl Server {
         let service = begun.map_err(|panic| panicked(&panic))?.map_err(ServerError::Open)?;
         Ok(Self {
             service,
+            membership,
             recorder: RequestRecorder::new(metrics, audit),
             access,
             tls,
             lifecycle: Lifecycle::default(),
             http,
             admin,
-            grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
+            grpc,
             http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
             wanted,
@@ -165,11 +172,11 @@ impl Server {
     }
 
     /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
-    /// is in flight, its connections, saving, and a while for what comes after.
+    /// is in flight, its maps that other nodes take over, its connections, saving, and a while for what comes after.
     pub fn down_within(&self) -> Duration {
         let config = &self.config;
         let waited = config.drain_delay().saturating_add(config.drain()).saturating_add(saving_max(config));
-        waited.saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
+        waited.saturating_add(Membership::LEAVING_MAX + CLOSING_MAX + ENDING_MAX)
     }
 
     /// Opens the maps, and serves each as soon as it is open, until `shutdown`. Then it goes down: says for
@@ -185,7 +192,7 @@ impl Server {
     /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
         let files = self.files();
-        let Self { config, access, tls, service, recorder, lifecycle, wanted, .. } = self;
+        let Self { config, access, tls, service, membership, recorder, lifecycle, wanted, .. } = self;
         let (http_tcp, http_unix, grpc_tcp, grpc_unix) =
             (self.http, self.http_socket, self.grpc, self.grpc_socket);
         let admin_tcp = self.admin;
@@ -218,6 +225,7 @@ impl Server {
             }
         }
         let mut opening = Opening::begin(service.clone(), wanted, health).await;
+        membership.begin(&service, &lifecycle, &config.cluster);
         tracing::info!(http = %http_tcp.address, grpc = %grpc_tcp.address, "serving");
         let admin_sockets = admin_tcp.map(|tcp| (&admin, tcp, None));
         let sockets = [(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)];
@@ -234,6 +242,8 @@ impl Server {
 
         lifecycle.leave();
         opening.end().await;
+        // What comes from now on goes on to those that take over.
+        membership.leave(&service).await;
         if ended.is_ok() && config.drain_delay_s > 0 {
             tracing::info!(
                 drain_delay_s = config.drain_delay_s,
@@ -258,7 +268,7 @@ impl Server {
         looking.abort();
         let saving = async {
             // They end by themselves when draining begins; waiting keeps the last saving of the one apart from this.
-            let _ended = tokio::join!(housekeeping, watching);
+            let _ended = tokio::join!(housekeeping, watching, membership.end());
             service.save().await
         };
         let most = saving_max(&config);

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::tls::TlsError;
-use crate::access::KeyFileError;
+use crate::access::{ClusterSecretError, KeyFileError};
+use crate::config::ConfigError;
 use crate::telemetry::TelemetryError;
 use mrol_service::ServiceError;
 
@@ -16,6 +17,22 @@ pub enum ServerError {
     /// The maps cannot be opened.
     #[error("the maps cannot be opened: {0}")]
     Open(ServiceError),
+    /// The program was built without clusters.
+    #[error(
+        "this program was built without clusters (cluster.nats is set): build it with the feature `cluster`, which \
+         released programs have"
+    )]
+    NoClusters,
+    /// The secret of the cluster cannot be read.
+    #[error(transparent)]
+    ClusterSecret(#[from] ClusterSecretError),
+    /// Other nodes cannot be asked.
+    #[cfg(feature = "cluster")]
+    #[error("the other nodes of the cluster cannot be asked: {0}")]
+    Forwarder(#[from] mrol_cluster::ForwarderError),
+    /// A setting is missing.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// An address cannot be listened on.
     #[error("{protocol} cannot listen on {address}: {error}")]
     Listen {

@@ -12,6 +12,11 @@ mod expiry;
 mod files;
 mod handshakes;
 mod listener;
+#[cfg(feature = "cluster")]
+mod membership;
+#[cfg(not(feature = "cluster"))]
+#[path = "no_membership.rs"]
+mod membership;
 mod opening;
 mod protocol;
 mod rlimit;
@@ -28,5 +33,7 @@ pub use bound::Server;
 pub use daemon::{Daemon, Taken};
 pub use error::ServerError;
 pub use files::ReloadableFiles;
+#[cfg(feature = "cluster")]
+pub use membership::engine_settings;
 pub use signal::{Hangups, exit_after, exit_when_told, shutdown_signal};
 pub use tls::TlsError;

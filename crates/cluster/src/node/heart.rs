@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use mrol_service::replication::NodeName;
 use mrol_service::{Lead, MapService, SharedMap};
+use parking_lot::Mutex;
 use tokio::sync::watch;
 use uuid::Uuid;
 
@@ -31,6 +32,8 @@ pub(super) struct Heart {
     /// Is told the addresses of the others.
     pub(super) forwarder: Arc<Forwarder>,
     pub(super) view: watch::Sender<View>,
+    /// Since when a copy is behind those of others, or not there.
+    pub(super) behind_since: Arc<Mutex<Option<Instant>>>,
 }
 
 impl Heart {
@@ -61,7 +64,8 @@ impl Heart {
 
     fn beat_once(&self, liveness: &mut Liveness, beats: &mut u64) -> Result<(), String> {
         let text = |error: crate::bucket::BucketError| error.to_string();
-        let revision = self.joined.beats.put(&self.settings.name, &self.own_beat()).map_err(text)?;
+        let own = self.own_beat();
+        let revision = self.joined.beats.put(&self.settings.name, &own).map_err(text)?;
         liveness.own_beat_acknowledged(revision);
         *beats += 1;
         let read = self.joined.beats.read().map_err(text)?;
@@ -82,6 +86,10 @@ impl Heart {
             (node, Seen { beat, is_live })
         };
         let now = View { beats: *beats, others: others.into_iter().map(seen).collect() };
+        let is_behind = is_behind(&own, &self.view.borrow());
+        let mut since = self.behind_since.lock();
+        *since = is_behind.then(|| since.unwrap_or_else(Instant::now));
+        drop(since);
         tell_changes(&self.view.borrow(), &now);
         let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
         self.forwarder.set_addresses(grpc.collect());
@@ -102,6 +110,15 @@ fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
     let is_parted = map.failure.is_some();
     let revision = map.version.revision;
     Some((map.version.map_uuid, MapHead { revision, epoch, sequence, leads: is_here, is_parted }))
+}
+
+/// True where a copy is behind where another node was a beat ago, or is not there.
+fn is_behind(own: &Beat, before: &View) -> bool {
+    let live = before.others.values().filter(|seen| seen.is_live);
+    let heads = live.flat_map(|seen| &seen.beat.maps).filter(|(_, head)| !head.is_parted);
+    let is_reached =
+        |map: &Uuid, revision: u64| own.maps.get(map).is_some_and(|own| own.revision >= revision);
+    heads.into_iter().any(|(map, head)| !is_reached(map, head.revision))
 }
 
 /// Tells the log which nodes have come and gone.

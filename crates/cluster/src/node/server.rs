@@ -24,9 +24,6 @@ use crate::forwarder::Forwarder;
 
 /// Pause before NATS is tried again.
 const CONNECT_AGAIN: Duration = Duration::from_secs(1);
-/// How long a node that leaves waits for the others to take its maps over, all in all.
-const LEAVING_MAX: Duration = Duration::from_secs(5);
-
 /// A node of the cluster: a server that shares its maps with others. It is made before the server's maps are opened,
 /// whose operations enter maps by it, and begins to work with [`Node::begin`].
 pub struct Node {
@@ -34,6 +31,8 @@ pub struct Node {
     forwarder: Arc<Forwarder>,
     joined: Arc<OnceLock<Joined>>,
     view: watch::Sender<View>,
+    /// Since when a copy is behind those of others, or not there.
+    behind_since: Arc<Mutex<Option<Instant>>>,
     wishes: mpsc::UnboundedSender<Wish>,
     heard: Mutex<Option<mpsc::UnboundedReceiver<Wish>>>,
     work: Mutex<Option<task::JoinHandle<()>>>,
@@ -52,6 +51,9 @@ pub struct NodeStatus {
 }
 
 impl Node {
+    /// How long a node that leaves may take to hand over its maps, all in all.
+    pub const LEAVING_MAX: Duration = Duration::from_secs(5);
+
     /// A node that does nothing yet, and asks others by `forwarder`.
     pub fn new(settings: NodeSettings, forwarder: Forwarder) -> Arc<Self> {
         let (wishes, heard) = mpsc::unbounded_channel();
@@ -60,6 +62,7 @@ impl Node {
             forwarder: Arc::new(forwarder),
             joined: Arc::default(),
             view: watch::Sender::new(View::default()),
+            behind_since: Arc::default(),
             wishes,
             heard: Mutex::new(Some(heard)),
             work: Mutex::new(None),
@@ -93,6 +96,7 @@ impl Node {
             service: service.clone(),
             forwarder: Arc::clone(&self.forwarder),
             view: self.view.clone(),
+            behind_since: Arc::clone(&self.behind_since),
         };
         match std::thread::Builder::new().name("beats".to_owned()).spawn(move || heart.beat(&ended)) {
             Ok(thread) => *self.heart.lock() = Some((end, thread)),
@@ -138,10 +142,16 @@ impl Node {
         }
     }
 
+    /// True before it has joined the cluster, and where a copy is behind those of others, or lacking, for so long.
+    pub fn is_behind(&self, lag_max: Duration) -> bool {
+        let since = *self.behind_since.lock();
+        self.view.borrow().beats == 0 || since.is_some_and(|since| since.elapsed() > lag_max)
+    }
+
     /// Hands the maps that it leads over to others, waits until those have taken over, for some seconds at most, and
     /// ends its work: what is asked of it from then on goes on to them.
     pub async fn leave(&self, service: &MapService) {
-        let until = Instant::now() + LEAVING_MAX;
+        let until = Instant::now() + Self::LEAVING_MAX;
         let led = |service: &MapService| {
             let maps = service.shared_maps().into_iter();
             maps.filter(|map| matches!(map.lead, Lead::Shared { is_here: true, .. })).collect::<Vec<_>>()

@@ -1,0 +1,118 @@
+//! The server as a node of a cluster.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use mrol_cluster::{
+    Credentials, EngineSettings, Forwarder, ForwarderSettings, Node, NodeCertificate, NodeSettings,
+};
+use mrol_service::{Cluster, MapService};
+use mrol_store::JOURNAL_VERSION;
+use tokio::time::interval;
+
+use super::error::ServerError;
+use crate::access::{Access, read_cluster_secret};
+use crate::admission::Lifecycle;
+use crate::config::{ClusterConfig, Config, advertised};
+
+/// How often it is looked whether the node is behind.
+const LOOKED_EVERY: Duration = Duration::from_secs(1);
+
+/// A server's part in a cluster; nothing of a server by itself.
+#[derive(Debug, Default)]
+pub(super) struct Membership(Option<Arc<Node>>);
+
+impl Membership {
+    /// How long a node may take to hand its maps over when it is told to end.
+    pub(super) const LEAVING_MAX: Duration = Node::LEAVING_MAX;
+
+    /// The part that the settings give it, and the access that other nodes have besides.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or an address is not known.
+    pub(super) fn of(
+        config: &Config,
+        (http, grpc): (SocketAddr, SocketAddr),
+        access: Access,
+    ) -> Result<(Self, Access), ServerError> {
+        let cluster = &config.cluster;
+        let Some(name) = cluster.node_name().filter(|_| cluster.is_used()) else {
+            return Ok((Self::default(), access));
+        };
+        let secret = cluster.secret_file.as_deref().map(read_cluster_secret).transpose()?;
+        let access = match &secret {
+            Some(secret) => access.with_cluster_secret(secret),
+            None => access,
+        };
+        let is_secured = config.tls.certificate.is_some();
+        let certificate = config.tls.certificate.clone().zip(config.tls.key.clone());
+        let forwarder = Forwarder::new(ForwarderSettings {
+            secret: secret.map(|secret| secret.reveal().to_owned()),
+            root_certificates: cluster.ca.clone(),
+            // Nodes that ask their clients for a certificate are shown that of this one.
+            certificate: certificate
+                .filter(|_| config.tls.client_ca.is_some())
+                .map(|(certificate, key)| NodeCertificate { certificate, key }),
+            ..ForwarderSettings::new(name.clone())
+        })?;
+        let settings = NodeSettings {
+            http: advertised("cluster.http", cluster.http.as_ref(), http, is_secured)?,
+            grpc: advertised("cluster.grpc", cluster.grpc.as_ref(), grpc, is_secured)?,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            record_version: JOURNAL_VERSION,
+            engine: engine_settings(cluster, name.as_str()),
+            name,
+        };
+        Ok((Self(Some(Node::new(settings, forwarder))), access))
+    }
+
+    /// What the operations of the service have of it.
+    pub(super) fn cluster(&self) -> Option<Cluster> {
+        self.0.as_ref().map(|node| node.cluster())
+    }
+
+    /// Begins to work; `lifecycle` is told when the node is behind the others for longer than the settings allow.
+    pub(super) fn begin(&self, service: &MapService, lifecycle: &Lifecycle, config: &ClusterConfig) {
+        let Some(node) = &self.0 else { return };
+        node.begin(service.clone());
+        let (node, lifecycle, lag_max) = (Arc::clone(node), lifecycle.clone(), config.lag_max());
+        tokio::spawn(async move {
+            let mut due = interval(LOOKED_EVERY);
+            while !lifecycle.is_draining() {
+                due.tick().await;
+                lifecycle.set_behind(node.is_behind(lag_max));
+            }
+        });
+    }
+
+    /// Hands the maps that it leads over to other nodes.
+    pub(super) async fn leave(&self, service: &MapService) {
+        if let Some(node) = &self.0 {
+            node.leave(service).await;
+        }
+    }
+
+    /// Ends its work.
+    pub(super) async fn end(&self) {
+        if let Some(node) = &self.0 {
+            node.end().await;
+        }
+    }
+}
+
+/// How a node reaches NATS.
+pub fn engine_settings(cluster: &ClusterConfig, name: &str) -> EngineSettings {
+    let credentials = match (&cluster.credentials_file, &cluster.nkey_file) {
+        (Some(file), _) => Credentials::CredentialsFile(file.clone()),
+        (None, Some(file)) => Credentials::NkeySeedFile(file.clone()),
+        (None, None) => Credentials::None,
+    };
+    EngineSettings {
+        urls: cluster.nats.clone(),
+        credentials,
+        root_certificates: cluster.ca.clone(),
+        replicas: cluster.replicas as usize,
+        name: format!("mrol {name}"),
+    }
+}
