@@ -10,6 +10,7 @@ use uuid::Uuid;
 use super::joined::{Joined, blocking, no_quorum};
 use super::keepers::{Wish, remove_log};
 use crate::catalog::CatalogError;
+use crate::jetstream_log::JetStreamLog;
 
 /// Enters maps into the cluster's list and deletes them.
 #[derive(Debug)]
@@ -46,6 +47,7 @@ impl Entering {
             let NewMap { uuid, base, file } = new;
             joined.bases.put(uuid, &base, &file).map_err(|error| no_quorum(&error))?;
             joined.pointers.change(uuid, &base, 0).map_err(|error| no_quorum(&error))?;
+            JetStreamLog::create(&joined.engine, uuid).map_err(|error| no_quorum(&error))?;
             let entered = joined.catalog.enter(&of, uuid);
             let may_be_there = match &entered {
                 Ok(there) => *there == uuid,

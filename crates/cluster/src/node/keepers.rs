@@ -20,6 +20,9 @@ use crate::jetstream_log::JetStreamLog;
 const DONE_WITHIN: Duration = Duration::from_secs(20);
 /// How often it is looked for it.
 const LOOKED_EVERY: Duration = Duration::from_millis(10);
+/// How long after a hint the list is read again, and how often.
+const HEARD_AHEAD: Duration = Duration::from_millis(20);
+const LOOKS_MAX: usize = 10;
 /// How long a map that was deleted stays listed as such, at least.
 const DELETED_FOR: Duration = Duration::from_secs(60);
 
@@ -40,6 +43,8 @@ pub(super) struct Keepers {
     joined: Joined,
     view: watch::Receiver<View>,
     kept: BTreeMap<MapName, Kept>,
+    /// Revision of the list that was followed last.
+    revision: u64,
     /// Maps that were deleted, since when this node knows.
     deleted: BTreeMap<Uuid, Instant>,
 }
@@ -63,34 +68,49 @@ impl Keepers {
         joined: Joined,
         view: watch::Receiver<View>,
     ) -> Self {
-        Self { node, service, joined, view, kept: BTreeMap::new(), deleted: BTreeMap::new() }
+        Self { node, service, joined, view, kept: BTreeMap::new(), revision: 0, deleted: BTreeMap::new() }
     }
 
     /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
     pub(super) async fn keep(mut self, mut wishes: mpsc::UnboundedReceiver<Wish>) {
         let mut hints = self.joined.catalog.hints(&self.joined.engine);
         let mut view = self.view.clone();
+        let mut looks = 0;
         loop {
-            self.follow_list().await;
+            // That it was changed is heard before every server of NATS has the change.
+            while !self.follow_list().await && looks > 0 {
+                looks -= 1;
+                tokio::time::sleep(HEARD_AHEAD).await;
+            }
+            looks = 0;
             tokio::select! {
                 wish = wishes.recv() => match wish {
                     Some(wish) => {
-                        self.follow_list().await;
+                        looks = LOOKS_MAX;
                         tokio::spawn(fulfil(self.service.clone(), wish));
                     }
                     None => return,
                 },
                 _ = view.changed() => self.forget_deleted().await,
-                () = hints.next() => {}
+                () = hints.next() => looks = LOOKS_MAX,
             }
         }
     }
 
-    async fn follow_list(&mut self) {
+    /// Does what the list says; true where that is another than before.
+    async fn follow_list(&mut self) -> bool {
         let catalog = self.joined.catalog.clone();
         match blocking(move || catalog.read()).await {
-            Ok((listing, _)) => self.follow(&listing).await,
-            Err(error) => tracing::debug!(%error, "the list of maps was not read"),
+            Ok((listing, revision)) => {
+                let is_new = std::mem::replace(&mut self.revision, revision) != revision;
+                // A copy that could not be dropped then is dropped now.
+                self.follow(&listing).await;
+                is_new
+            }
+            Err(error) => {
+                tracing::debug!(%error, "the list of maps was not read");
+                false
+            }
         }
     }
 

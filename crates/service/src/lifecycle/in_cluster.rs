@@ -31,7 +31,10 @@ impl MapService {
         if !self.inner.catalog.has(&reachable) {
             self.inner.budget.check_to_grow()?;
             self.inner.catalog.check_free(&reachable, self.limits().maps_max, false)?;
-            is_new = cluster.catalog.enter(name, empty_map(settings)?).await?;
+            // On no lane: its maker is answered, whatever else the server has to do.
+            let made = tokio::task::spawn_blocking(move || empty_map(settings)).await;
+            let new = made.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()))?;
+            is_new = cluster.catalog.enter(name, new).await?;
         }
         Ok((same_settings(self.map(name).await?, settings)?, is_new))
     }
@@ -68,6 +71,18 @@ impl MapService {
             ));
         }
         self.map(name).await
+    }
+
+    /// A map as it is, to be shared from now on: with its uuid and revision. Nobody changes it meanwhile.
+    ///
+    /// # Errors
+    /// As for [`MapService::snapshot_map`].
+    pub async fn to_share(&self, name: &MapName) -> Result<NewMap, ServiceError> {
+        let (map, file) = (self.map(name).await?, self.snapshot_map(name).await?);
+        let core = Arc::clone(&map.map);
+        let base = tokio::task::spawn_blocking(move || base_of(&core)).await;
+        let base = base.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()));
+        Ok(NewMap { uuid: map.uuid, base, file: file.bytes })
     }
 
     /// Deletes a map on all nodes, or on this one where only this one has it; its last version here.
