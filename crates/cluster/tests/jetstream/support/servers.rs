@@ -37,8 +37,17 @@ impl NatsServers {
         Self::start_with(count, "", "")
     }
 
+    /// So many servers that do not tell clients of each other: those reach only what they know.
+    pub(crate) fn start_apart(count: usize) -> Option<Self> {
+        Self::start_of(count, "", "", "no_advertise: true")
+    }
+
     /// So many servers, with more of a configuration, and of that of their stores.
     pub(crate) fn start_with(count: usize, more: &str, of_stores: &str) -> Option<Self> {
+        Self::start_of(count, more, of_stores, "")
+    }
+
+    fn start_of(count: usize, more: &str, of_stores: &str, of_cluster: &str) -> Option<Self> {
         let Some(program) = std::env::var_os(PROGRAM) else {
             skipped(&format!("no nats-server (set {PROGRAM} to what .ci/nats-server prints)"));
             return None;
@@ -57,8 +66,9 @@ impl NatsServers {
             );
             if count > 1 {
                 let routes = routes_text.join(", ");
-                config +=
-                    &format!("cluster {{ name: c, listen: \"127.0.0.1:{route}\", routes: [{routes}] }}\n");
+                config += &format!(
+                    "cluster {{ name: c, listen: \"127.0.0.1:{route}\", routes: [{routes}], {of_cluster} }}\n"
+                );
             }
             fs::write(folder.path().join(format!("{index}.conf")), config).unwrap();
         }
@@ -93,6 +103,17 @@ impl NatsServers {
             process.kill().unwrap();
             process.wait().unwrap();
         }
+    }
+
+    /// Sends one a signal, by its name.
+    pub(crate) fn signal(&self, index: usize, name: &str) {
+        let id = self.servers[index].process.as_ref().unwrap().id().to_string();
+        assert!(Command::new("kill").args(["-s", name, &id]).status().unwrap().success());
+    }
+
+    /// The folder of a server's store.
+    pub(crate) fn store(&self, index: usize) -> PathBuf {
+        self.folder.path().join(format!("store{index}"))
     }
 
     /// Kills all with -9.
@@ -132,6 +153,11 @@ impl NatsServers {
             let name = format!("store{index}");
             what(&self.folder.path().join(&name), &name);
         }
+    }
+
+    /// Ports of the servers.
+    pub(crate) fn ports(&self) -> Vec<u16> {
+        self.servers.iter().map(|server| server.port).collect()
     }
 
     /// Addresses of the servers.

@@ -1,0 +1,84 @@
+//! Nodes and servers of NATS, each a process of its own, are killed, stopped, cut off, filled up and put back to older
+//! copies, while four writers write and a reader reads at each node. Every change that was acknowledged is there once,
+//! and all nodes are equal.
+//!
+//! ```text
+//! NATS_SERVER_PROGRAM=$(.ci/nats-server) cargo test --test cluster
+//! MROL_CLUSTER_ROUNDS=100 NATS_SERVER_PROGRAM=$(.ci/nats-server) cargo test --release --test cluster -- --nocapture
+//! ```
+
+#![cfg(all(feature = "cluster", target_os = "linux"))]
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod faults;
+mod link;
+mod load;
+#[expect(dead_code, reason = "the tests of the log use more of it")]
+mod nats;
+mod site;
+
+use std::time::{Duration, Instant};
+
+use mrol::map::MapName;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+use crate::faults::{FAULTS, Fault, Report};
+use crate::load::Load;
+use crate::site::{MapState, NODES, Site, WITHIN};
+
+/// Faults at random of the long form; 0 = each once, in order.
+fn rounds() -> usize {
+    std::env::var("MROL_CLUSTER_ROUNDS").map_or(0, |text| text.parse().expect("a number"))
+}
+
+/// Where faults at random begin.
+fn seed() -> u64 {
+    std::env::var("MROL_CLUSTER_SEED").map_or(1, |text| text.parse().expect("a number"))
+}
+
+#[test]
+fn no_acknowledged_change_is_lost_or_made_twice_whatever_fails() {
+    let Some(mut site) = Site::start() else { return };
+    let map = MapName::new("hall").unwrap();
+    site.create(&map);
+    let load = Load::begin(&site, &map);
+    load.wait_for(20);
+    let mut report = Report::default();
+    let mut random = StdRng::seed_from_u64(seed());
+    let faults: Vec<Fault> = match rounds() {
+        0 => FAULTS.to_vec(),
+        rounds => (0..rounds).map(|_| FAULTS[random.random_range(0..FAULTS.len())]).collect(),
+    };
+    for (round, fault) in faults.iter().enumerate() {
+        let begun = Instant::now();
+        println!("{round}: {fault:?}");
+        fault.happen(&mut site, &load, &map);
+        load.wait_for(10);
+        report.note(*fault, load.longest_gap(begun));
+    }
+    let (scans, readers) = load.end(&site);
+    check_equal(&site, &map, scans);
+    report.print();
+    for (node, reads) in readers.iter().enumerate() {
+        let (failed, answered, slow) = reads.summary();
+        println!("reads at node {node}: {answered}, of which 99 % within {slow:?}; {failed} failed");
+        assert!(failed <= 5, "reads failed at a node that was up: {failed}");
+    }
+    println!("{scans} scans, each once");
+}
+
+/// All nodes are at one revision with one content, and every scan that was acknowledged is there once.
+#[track_caller]
+fn check_equal(site: &Site, map: &MapName, scans: usize) {
+    let begun = Instant::now();
+    loop {
+        let states: Vec<Option<MapState>> = (0..NODES).map(|node| site.state(node, map)).collect();
+        let is_all = |state: &MapState| state.scans == scans && state.voxels == scans;
+        if states[0].as_ref().is_some_and(is_all) && states.iter().all(|state| *state == states[0]) {
+            return;
+        }
+        assert!(begun.elapsed() < WITHIN, "{states:?} after {scans} scans");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}

@@ -1,0 +1,273 @@
+//! A site: three servers of NATS and three nodes, each a process of its own.
+
+use std::fs;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use mrol::client::{Client, NewMap};
+use mrol::map::{ContentHash, MapName};
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+
+use crate::link::Link;
+use crate::nats::NatsServers;
+
+pub(crate) const NODES: usize = 3;
+
+/// How long anything may take that is to come by itself: the machine may be busy with other tests.
+pub(crate) const WITHIN: Duration = Duration::from_secs(60);
+
+/// A site: three servers of NATS and three nodes.
+pub(crate) struct Site {
+    pub(crate) nats: NatsServers,
+    folder: TempDir,
+    nodes: Vec<Node>,
+    runtime: Runtime,
+}
+
+struct Node {
+    http: u16,
+    grpc: u16,
+    /// How it reaches the servers of NATS.
+    to_nats: Vec<Link>,
+    /// How the other nodes reach it.
+    from_others: Link,
+    process: Option<Child>,
+}
+
+impl Site {
+    /// A site with nodes that are ready; none where there is no program `nats-server`.
+    pub(crate) fn start() -> Option<Self> {
+        let nats = NatsServers::start_apart(NODES)?;
+        let node = |_| {
+            let [http, grpc] = free_ports();
+            let to_nats = nats.ports().into_iter().map(Link::to).collect();
+            Node { http, grpc, to_nats, from_others: Link::to(grpc), process: None }
+        };
+        let nodes = (0..NODES).map(node).collect();
+        drop(nats.engine());
+        let mut site =
+            Self { nats, folder: TempDir::new().unwrap(), nodes, runtime: Runtime::new().unwrap() };
+        (0..NODES).for_each(|node| site.start_node(node));
+        (0..NODES).for_each(|node| site.wait_until_ready(node));
+        Some(site)
+    }
+
+    /// The data folder of a node.
+    pub(crate) fn data(&self, node: usize) -> PathBuf {
+        self.folder.path().join(format!("data{node}"))
+    }
+
+    /// Starts a node that does not run.
+    pub(crate) fn start_node(&mut self, index: usize) {
+        let (data, log) = (self.data(index), self.folder.path().join(format!("{index}.log")));
+        fs::create_dir_all(&data).unwrap();
+        let node = &mut self.nodes[index];
+        if node.process.is_some() {
+            return;
+        }
+        let urls: Vec<_> =
+            node.to_nats.iter().map(|link| format!("nats://127.0.0.1:{}", link.port())).collect();
+        let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+        command
+            .args(["serve", "--log-level", "info,mrol::audit=off", "--data-dir", data.to_str().unwrap()])
+            .args(["--http-listen", &format!("127.0.0.1:{}", node.http)])
+            .args(["--grpc-listen", &format!("127.0.0.1:{}", node.grpc)])
+            .args(["--cluster", &urls.join(","), "--node", &format!("n{index}")])
+            .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()))
+            .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
+            .stdout(Stdio::null())
+            .stderr(log);
+        node.process = Some(command.spawn().unwrap());
+    }
+
+    /// Kills a node with -9.
+    pub(crate) fn kill_node(&mut self, index: usize) {
+        if let Some(mut process) = self.nodes[index].process.take() {
+            process.kill().unwrap();
+            process.wait().unwrap();
+        }
+    }
+
+    /// Sends a node a signal, by its name.
+    pub(crate) fn signal(&self, index: usize, name: &str) {
+        let id = self.nodes[index].process.as_ref().unwrap().id().to_string();
+        assert!(Command::new("kill").args(["-s", name, &id]).status().unwrap().success());
+    }
+
+    /// Tells a node to end, as a service manager does, and waits for it.
+    pub(crate) fn end_node(&mut self, index: usize) {
+        self.signal(index, "TERM");
+        let mut process = self.nodes[index].process.take().unwrap();
+        let begun = Instant::now();
+        while process.try_wait().unwrap().is_none() {
+            assert!(begun.elapsed() < WITHIN, "node {index} does not end: {}", self.log_of(index));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Cuts a node off from NATS, and the other nodes from it.
+    pub(crate) fn cut_off(&self, index: usize) {
+        self.nodes[index].links().for_each(Link::cut);
+    }
+
+    /// Lets it be reached again.
+    pub(crate) fn mend(&self, index: usize) {
+        self.nodes[index].links().for_each(Link::mend);
+    }
+
+    /// True of a node whose process runs.
+    pub(crate) fn runs(&self, index: usize) -> bool {
+        self.nodes[index].process.is_some()
+    }
+
+    /// Address of gRPC of a node, as its clients reach it.
+    pub(crate) fn grpc(&self, index: usize) -> String {
+        format!("http://127.0.0.1:{}", self.nodes[index].grpc)
+    }
+
+    /// All of them, that of this node first.
+    pub(crate) fn all_grpc(&self, first: usize) -> String {
+        let all: Vec<_> = (0..NODES).map(|node| self.grpc((first + node) % NODES)).collect();
+        all.join(",")
+    }
+
+    /// What the log of a node ends with.
+    pub(crate) fn log_of(&self, index: usize) -> String {
+        let text = fs::read_to_string(self.folder.path().join(format!("{index}.log"))).unwrap_or_default();
+        let lines: Vec<_> = text.lines().collect();
+        lines[lines.len().saturating_sub(40)..].join("\n")
+    }
+
+    /// Waits until a node says that it is ready.
+    #[track_caller]
+    pub(crate) fn wait_until_ready(&self, index: usize) {
+        let url = format!("http://127.0.0.1:{}/readyz", self.nodes[index].http);
+        let begun = Instant::now();
+        loop {
+            let asked = self.runtime.block_on(async { reqwest::get(&url).await });
+            if asked.is_ok_and(|answer| answer.status() == 200) {
+                return;
+            }
+            assert!(begun.elapsed() < WITHIN, "node {index} is not ready: {}", self.log_of(index));
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// A client of a node, on the runtime of the site.
+    pub(crate) fn client(&self, addresses: &str) -> Client {
+        let begun = Instant::now();
+        loop {
+            match self.runtime.block_on(Client::connect(addresses)) {
+                Ok(client) => return client,
+                Err(error) => assert!(begun.elapsed() < WITHIN, "{error}"),
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// The runtime of all clients.
+    pub(crate) fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
+    /// Makes the map of the test.
+    pub(crate) fn create(&self, map: &MapName) {
+        let client = self.client(&self.all_grpc(0));
+        let settings = NewMap { levels: Some(2), ..NewMap::of(0.5) };
+        self.runtime.block_on(client.create_map(map, settings)).unwrap();
+    }
+
+    /// Revision, content, scans and voxels of a map at a node.
+    pub(crate) fn state(&self, index: usize, map: &MapName) -> Option<MapState> {
+        let client = self.runtime.block_on(Client::connect(&self.grpc(index))).ok()?;
+        let info = self.runtime.block_on(client.map_info(map)).ok()?;
+        Some(MapState {
+            revision: info.version.revision,
+            hash: info.version.content_hash,
+            scans: info.scans,
+            voxels: info.levels[0].voxels,
+        })
+    }
+
+    /// The node that leads a map, by its log's own words: the last that said so.
+    pub(crate) fn leader(&self, map: &MapName) -> usize {
+        let begun = Instant::now();
+        loop {
+            let said = (0..NODES).filter_map(|node| {
+                let text = fs::read_to_string(self.folder.path().join(format!("{node}.log"))).ok()?;
+                let leads = |line: &&str| line.contains(" leads map=") && line.contains(map.as_str());
+                let epoch = |line: &str| line.split("epoch=").nth(1)?.split(' ').next()?.parse::<u64>().ok();
+                Some((text.lines().filter(leads).filter_map(epoch).max()?, node))
+            });
+            if let Some((_, node)) = said.max() {
+                return node;
+            }
+            assert!(begun.elapsed() < WITHIN, "nobody leads");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Node {
+    fn links(&self) -> impl Iterator<Item = &Link> {
+        self.to_nats.iter().chain([&self.from_others])
+    }
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            (0..NODES).for_each(|node| eprintln!("--- node {node}\n{}", self.log_of(node)));
+        }
+        (0..NODES).for_each(|node| self.kill_node(node));
+    }
+}
+
+/// How a node has a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MapState {
+    pub(crate) revision: u64,
+    pub(crate) hash: Option<ContentHash>,
+    pub(crate) scans: usize,
+    pub(crate) voxels: usize,
+}
+
+/// A disk of a test: a small file system in memory, which can be filled. Mounting takes root.
+pub(crate) struct SmallDisk(PathBuf);
+
+impl SmallDisk {
+    /// In the place of what a folder has; none without the right to mount.
+    pub(crate) fn over(folder: &Path, megabytes: u32) -> Option<Self> {
+        fs::create_dir_all(folder).unwrap();
+        let size = format!("size={megabytes}m");
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(folder).stderr(Stdio::null());
+        mount.status().is_ok_and(|status| status.success()).then(|| Self(folder.to_owned()))
+    }
+
+    /// Takes all of it.
+    pub(crate) fn fill(&self) {
+        let filled = fs::write(self.0.join("filler"), vec![1; 512 << 20]);
+        assert!(filled.is_err(), "it is larger than it should be");
+    }
+
+    /// Gives back what was taken.
+    pub(crate) fn free(&self) {
+        fs::remove_file(self.0.join("filler")).unwrap();
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        _ = Command::new("umount").arg("-l").arg(&self.0).status();
+    }
+}
+
+fn free_ports() -> [u16; 2] {
+    let listeners = [0; 2].map(|_| TcpListener::bind("127.0.0.1:0").unwrap());
+    listeners.map(|listener| listener.local_addr().unwrap().port())
+}
