@@ -4,6 +4,7 @@
 
 mod admission;
 mod authorization;
+mod forwarding;
 mod fuzz_corpus;
 #[path = "../support/mod.rs"]
 mod support;

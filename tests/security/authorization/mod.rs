@@ -5,7 +5,7 @@ mod audit;
 mod browsers;
 mod disclosure;
 mod early;
-mod keyring;
+pub(crate) mod keyring;
 mod lifetimes;
 mod listening;
 mod paths;
