@@ -48,8 +48,9 @@ impl Gate {
         Self { access, service }
     }
 
-    /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it; and what it says
-    /// of the node that forwards it, which counts for the secret of the cluster alone. No page of a browser shows that.
+    /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it; and what it
+    /// says of the node that forwards it, which counts for the secret of the cluster alone. No page of a browser shows
+    /// that.
     ///
     /// # Errors
     /// `Unauthenticated` and `PermissionDenied`, as [`Access::authorize`] and [`Access::check_site`] say.

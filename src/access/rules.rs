@@ -132,12 +132,12 @@ impl Access {
         self.keys.is_none() && self.cluster_secret.is_none()
     }
 
-    /// The caller for whom a node asks for `operation`, if the caller itself may: who shows the secret of the cluster is
-    /// believed for whom it asks, and may do nothing else. `over_grpc` is true of a gRPC call: nodes make no others.
+    /// The caller for whom a node asks for `operation`, if the caller itself may: who shows the secret of the cluster
+    /// is believed for whom it asks, and may do nothing else. `over_grpc` is true of a gRPC call: nodes make no others.
     ///
     /// # Errors
-    /// `Unauthenticated` without the name of a node, or where the caller's key is needed and not known here, or its time
-    /// is up; `PermissionDenied` for what nodes do not ask, and where the key is for less.
+    /// `Unauthenticated` without the name of a node, or where the caller's key is needed and not known here, or its
+    /// time is up; `PermissionDenied` for what nodes do not ask, and where the key is for less.
     pub(super) fn authorize_forwarded(
         &self,
         operation: Operation,

@@ -91,7 +91,8 @@ impl Connection {
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
-    /// The error that a status is. Where the connection is replaced, a call that was never sent is told from one that was.
+    /// The error that a status is. Where the connection is replaced, a call that was never sent is told from one that
+    /// was.
     pub(super) fn failure(&self, status: &Status) -> ClientError {
         let error = ClientError::of(&self.url, status);
         if self.is_gone.is_none() || !matches!(error, ClientError::Lost { .. }) {

@@ -17,7 +17,8 @@ const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(2);
 const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A connection by which a node of a cluster forwards what its own callers ask. The other node believes what it says of
-/// them for the secret of the cluster, which is the key of its [`Credentials`]: without that it says nothing to anybody.
+/// them for the secret of the cluster, which is the key of its [`Credentials`]: without that it says nothing to
+/// anybody.
 ///
 /// A call is sent once. Its error tells what was not sent ([`ClientError::Unreachable`]) from what was
 /// ([`ClientError::Lost`]).

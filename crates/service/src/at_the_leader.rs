@@ -7,8 +7,8 @@
 //! ```
 //!
 //! A node that refuses because it does not lead has changed nothing, and neither has one that cannot be reached. So
-//! where the lead moves meanwhile the operation is tried again, where it is to be made by then: to callers a hand-over is
-//! a delay. What was sent and has an unknown outcome is not sent again.
+//! where the lead moves meanwhile the operation is tried again, where it is to be made by then: to callers a hand-over
+//! is a delay. What was sent and has an unknown outcome is not sent again.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,8 +24,8 @@ use super::replication::NodeName;
 
 /// How long after its beginning an operation is tried again.
 const TRIED_FOR: Duration = Duration::from_secs(5);
-/// The first pause between two attempts; each is twice as long as the one before, up to [`PAUSE_MAX`]. A lead that moves
-/// ends it.
+/// The first pause between two attempts; each is twice as long as the one before, up to [`PAUSE_MAX`]. A lead that
+/// moves ends it.
 const PAUSE_MIN: Duration = Duration::from_millis(50);
 const PAUSE_MAX: Duration = Duration::from_millis(200);
 
@@ -80,8 +80,9 @@ impl MapService {
         ForwardedCall { to, caller: self.caller.clone(), map: map.name.clone() }
     }
 
-    /// Makes an operation by `here` where this node leads the map, and otherwise by `there`, at the node that does. Both
-    /// may be called several times, since the lead may move; whatever the caller may not do is to be refused before.
+    /// Makes an operation by `here` where this node leads the map, and otherwise by `there`, at the node that does.
+    /// Both may be called several times, since the lead may move; whatever the caller may not do is to be refused
+    /// before.
     ///
     /// An operation that another node forwarded is made here or refused, at once: that node tries again.
     ///

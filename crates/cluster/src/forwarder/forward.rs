@@ -1,4 +1,4 @@
-//! Asking another node as its client.
+//! Calls to another node, as its client.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

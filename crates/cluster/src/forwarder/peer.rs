@@ -25,8 +25,8 @@ impl Peer {
         }
     }
 
-    /// The connection, which is made where there is none or the last one was lost. Of calls that wait for one, the first
-    /// makes it for all; where it cannot, all hear of it, and none waits longer than `timeout`.
+    /// The connection, which is made where there is none or the last one was lost. Of calls that wait for one, the
+    /// first makes it for all; where it cannot, all hear of it, and none waits longer than `timeout`.
     ///
     /// # Errors
     /// When the node does not answer, or the two do not trust each other.

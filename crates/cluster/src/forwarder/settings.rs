@@ -11,7 +11,8 @@ use mrol_service::replication::NodeName;
 pub struct ForwarderSettings {
     /// This node.
     pub node: NodeName,
-    /// The secret of the cluster, by which nodes believe each other whom they ask for; none where no keys are asked for.
+    /// The secret of the cluster, by which nodes believe each other whom they ask for; none where no keys are asked
+    /// for.
     pub secret: Option<String>,
     /// File of certificates in PEM that are trusted in the place of those of the system.
     pub root_certificates: Option<PathBuf>,

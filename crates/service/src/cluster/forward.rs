@@ -1,4 +1,4 @@
-//! Asking the node that leads a map.
+//! How another node is asked.
 
 use std::fmt::Debug;
 use std::pin::Pin;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use tokio_stream::Stream;
 
-use super::parts::Later;
+use super::later::Later;
 use crate::error::ServiceError;
 use crate::replication::NodeName;
 use crate::request::{
@@ -30,13 +30,13 @@ pub struct ForwardedCall {
 /// The messages of another node's watch of events.
 pub type ForwardedEvents = Pin<Box<dyn Stream<Item = Result<EventMessage, ServiceError>> + Send>>;
 
-/// Asks another node, for a caller of this one, what [`MapService`](crate::MapService) has under the same name. The other
-/// node checks the caller's key as if its holder had come to it, and takes the call no further: it fails with
+/// Asks another node, for a caller of this one, what [`MapService`](crate::MapService) has under the same name. The
+/// other node checks the caller's key as if its holder had come to it, and takes the call no further: it fails with
 /// `not_leader` where that node does not lead the map either.
 ///
-/// Every call is made once. It fails with `no_quorum` where the other node cannot be reached, and so nothing was changed;
-/// with `outcome_unknown` where a change was sent and nobody knows what became of it; and otherwise as the other node
-/// says.
+/// Every call is made once. It fails with `no_quorum` where the other node cannot be reached, and so nothing was
+/// changed; with `outcome_unknown` where a change was sent and nobody knows what became of it; and otherwise as the
+/// other node says.
 pub trait Forward: Debug + Send + Sync {
     /// Inserts a scan.
     fn insert_scan<'a>(

@@ -2,9 +2,11 @@
 //! [`SharedCatalog`] is the list of maps that all nodes share.
 
 mod forward;
+mod later;
 mod parts;
 mod shared_catalog;
 
 pub use forward::{Forward, ForwardedCall, ForwardedEvents};
-pub use parts::{Cluster, Later};
+pub use later::Later;
+pub use parts::Cluster;
 pub use shared_catalog::{NewMap, SharedCatalog};

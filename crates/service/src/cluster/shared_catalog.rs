@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use super::parts::Later;
+use super::later::Later;
 use crate::error::ServiceError;
 use crate::replication::Base;
 use mrol_map::map::MapName;

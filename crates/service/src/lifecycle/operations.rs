@@ -60,8 +60,8 @@ impl MapService {
         .await
     }
 
-    /// Describes a map, with the last sighting of each robot. Where another node leads, that one has seen the robots: if
-    /// it does not answer, none are told.
+    /// Describes a map, with the last sighting of each robot. Where another node leads, that one has seen the robots:
+    /// if it does not answer, none are told.
     ///
     /// # Errors
     /// `NotFound` without such a map.

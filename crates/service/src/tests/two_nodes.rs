@@ -129,7 +129,8 @@ impl Other {
         A: Send + 'a,
     {
         self.calls.lock().push((asked, call.clone()));
-        if let Some(error) = self.fails_with.lock().clone() {
+        let failure = self.fails_with.lock().clone();
+        if let Some(error) = failure {
             return Box::pin(std::future::ready(Err(error)));
         }
         let service = self.service.get().unwrap();
