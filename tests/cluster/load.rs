@@ -186,7 +186,8 @@ async fn read(grpc: String, map: MapName, is_over: Arc<AtomicBool>, reads: Arc<R
             None => {}
         }
         if !reads.is_up.load(Ordering::Acquire) {
-            client = None;
+            // It may begin anew from an older copy.
+            (client, revision) = (None, 0);
         }
     }
 }

@@ -119,11 +119,6 @@ impl Site {
         self.nodes[index].links().for_each(Link::mend);
     }
 
-    /// True of a node whose process runs.
-    pub(crate) fn runs(&self, index: usize) -> bool {
-        self.nodes[index].process.is_some()
-    }
-
     /// Address of gRPC of a node, as its clients reach it.
     pub(crate) fn grpc(&self, index: usize) -> String {
         format!("http://127.0.0.1:{}", self.nodes[index].grpc)

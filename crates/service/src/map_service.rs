@@ -205,8 +205,23 @@ impl MapService {
         (&mut submitted.outcome).await.map_err(commit_thread_ended)
     }
 
-    /// The map of that name, which is opened where it sleeps.
+    /// The map of that name, which is opened where it sleeps. Where another node has just made it, waits for the copy
+    /// of this one.
     pub(super) async fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
+        let here = self.map_here(name).await;
+        match (&here, &self.inner.settings.cluster) {
+            (Err(error), Some(cluster)) if error.reason == Reason::MapNotFound => {
+                if !cluster.catalog.look_for(name).await {
+                    return here;
+                }
+                self.map_here(name).await
+            }
+            _ => here,
+        }
+    }
+
+    /// The map of that name of which this server has a copy by now.
+    pub(super) async fn map_here(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
         self.inner.catalog.get(&self.allowed_maps.check(name)?, &self.asker).await
     }
 }

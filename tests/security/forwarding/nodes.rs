@@ -17,7 +17,7 @@ use mrol::map::{CallerName, MapName, MapSettings};
 use mrol::middleware::Middleware;
 use mrol::service::replication::NodeName;
 use mrol::service::{
-    Cluster, Later, Limits, MapService, Reason, ServiceError, ServiceSettings, SharedCatalog,
+    Cluster, Later, Limits, MapService, NewMap, Reason, ServiceError, ServiceSettings, SharedCatalog,
 };
 use mrol::store::OpeningProgress;
 use mrol::telemetry::{Audit, Metrics, RequestRecorder};
@@ -60,9 +60,13 @@ impl Nodes {
             node.forwarder.set_addresses([(other.name.clone(), address)].into());
         }
         let map = MapName::new("hall").unwrap();
-        let (info, _) = a.service.create_map(map.clone(), MapSettings::new(0.1, 3)).await.unwrap();
-        let file = a.service.snapshot_map(&map).await.unwrap();
-        b.service.copy_map(map.clone(), info.version.map_uuid, file.bytes).await.unwrap();
+        // A server by itself made it.
+        let alone = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let (info, _) = alone.create_map(map.clone(), MapSettings::new(0.1, 3)).await.unwrap();
+        let file = alone.snapshot_map(&map).await.unwrap().bytes;
+        for node in [&a, &b] {
+            node.service.copy_map(map.clone(), info.version.map_uuid, file.clone(), false).await.unwrap();
+        }
         let log = SharedLog::default();
         for node in [&a, &b] {
             node.service.share_map(&map, Arc::new(log.clone()), node.name.clone()).await.unwrap();
@@ -145,12 +149,12 @@ async fn serve(listener: TcpListener, router: Router) {
 }
 
 impl SharedCatalog for NoCatalog {
-    fn create<'a>(&'a self, _: &'a MapName, _: MapSettings) -> Later<'a, Result<bool, ServiceError>> {
+    fn enter<'a>(&'a self, _: &'a MapName, _: NewMap) -> Later<'a, Result<bool, ServiceError>> {
         none()
     }
 
-    fn restore<'a>(&'a self, _: &'a MapName, _: bytes::Bytes) -> Later<'a, Result<(), ServiceError>> {
-        none()
+    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, bool> {
+        Box::pin(std::future::ready(false))
     }
 
     fn delete<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<(), ServiceError>> {

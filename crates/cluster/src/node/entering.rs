@@ -1,26 +1,40 @@
 //! Maps are entered into the cluster's list and deleted, for the operations of the service.
 
 use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use mrol_map::map::MapName;
 use mrol_service::{Later, NewMap, Reason, ServiceError, SharedCatalog};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{Mutex, mpsc, oneshot};
+use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::joined::{Joined, blocking, no_quorum};
 use super::keepers::{Wish, remove_log};
-use crate::catalog::CatalogError;
+use crate::catalog::{CatalogError, Listing};
 use crate::jetstream_log::JetStreamLog;
 
 /// Enters maps into the cluster's list and deletes them.
 #[derive(Debug)]
 pub(super) struct Entering {
     /// None before NATS has answered.
-    pub(super) joined: Arc<OnceLock<Joined>>,
-    pub(super) wishes: mpsc::UnboundedSender<Wish>,
+    joined: Arc<OnceLock<Joined>>,
+    wishes: mpsc::UnboundedSender<Wish>,
+    /// The list as it was read last for a map that this node has no copy of, and when.
+    looked: Mutex<Option<(Instant, Listing)>>,
 }
 
+/// How long a list that was read answers for maps that this node has no copy of: names that nobody has cost NATS a few
+/// questions a second, whoever asks for them.
+const LOOKED_FOR: Duration = Duration::from_millis(100);
+/// How long a request waits for a copy of a map that another node has just made.
+const COPIED_WITHIN: Duration = Duration::from_secs(5);
+
 impl Entering {
+    pub(super) fn new(joined: Arc<OnceLock<Joined>>, wishes: mpsc::UnboundedSender<Wish>) -> Self {
+        Self { joined, wishes, looked: Mutex::default() }
+    }
+
     fn joined(&self) -> Result<Joined, ServiceError> {
         self.joined
             .get()
@@ -38,6 +52,19 @@ impl Entering {
         let what = if is_there { "is in the cluster" } else { "is deleted in the cluster" };
         let message = format!("map {name} {what}, and this node has not followed yet: ask again soon");
         Err(ServiceError::new(Reason::OutcomeUnknown, message))
+    }
+
+    /// The uuid of a map in the list of now.
+    async fn listed(&self, name: &MapName) -> Option<Uuid> {
+        let mut looked = self.looked.lock().await;
+        let is_new = |read: &Instant| read.elapsed() < LOOKED_FOR;
+        if !looked.as_ref().is_some_and(|(read, _)| is_new(read)) {
+            let joined = self.joined().ok()?;
+            let (listing, _) = blocking(move || joined.catalog.read()).await.ok()?;
+            *looked = Some((Instant::now(), listing));
+        }
+        let (_, listing) = looked.as_ref()?;
+        listing.map(name).map(|entry| entry.uuid)
     }
 
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
@@ -87,6 +114,18 @@ impl Entering {
 impl SharedCatalog for Entering {
     fn enter<'a>(&'a self, name: &'a MapName, new: NewMap) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(self.enter_map(name, new))
+    }
+
+    fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, bool> {
+        Box::pin(async move {
+            match self.listed(name).await {
+                Some(uuid) => {
+                    let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true)).await;
+                    waited.is_ok_and(|waited| waited.is_ok())
+                }
+                None => false,
+            }
+        })
     }
 
     fn delete<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<(), ServiceError>> {

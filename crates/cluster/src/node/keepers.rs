@@ -87,6 +87,9 @@ impl Keepers {
                 wish = wishes.recv() => match wish {
                     Some(wish) => {
                         looks = LOOKS_MAX;
+                        if wish.is_there && self.deleted.contains_key(&wish.uuid) {
+                            continue;
+                        }
                         tokio::spawn(fulfil(self.service.clone(), wish));
                     }
                     None => return,

@@ -75,7 +75,7 @@ impl Node {
         Cluster {
             node: self.settings.name.clone(),
             forward: Arc::clone(&self.forwarder) as Arc<dyn Forward>,
-            catalog: Arc::new(Entering { joined: Arc::clone(&self.joined), wishes: self.wishes.clone() }),
+            catalog: Arc::new(Entering::new(Arc::clone(&self.joined), self.wishes.clone())),
         }
     }
 

@@ -51,7 +51,7 @@ impl MapService {
     /// # Errors
     /// `MapUnavailable` where it has one that it cannot open.
     pub async fn uuid_of_copy(&self, name: &MapName) -> Result<Option<Uuid>, ServiceError> {
-        match self.map(name).await {
+        match self.map_here(name).await {
             Ok(map) => Ok(Some(map.uuid)),
             Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
             Err(error) => Err(error),
@@ -101,7 +101,7 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map.
     pub async fn version_of(&self, name: &MapName) -> Result<MapVersion, ServiceError> {
-        Ok(self.map(name).await?.version_now())
+        Ok(self.map_here(name).await?.version_now())
     }
 
     /// Which node makes the changes of a map; the receiver hears when that is another.
@@ -109,7 +109,7 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map.
     pub async fn lead_of(&self, name: &MapName) -> Result<watch::Receiver<Lead>, ServiceError> {
-        Ok(self.map(name).await?.commit_queue.lead())
+        Ok(self.map_here(name).await?.commit_queue.lead())
     }
 
     /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it
@@ -125,7 +125,7 @@ impl MapService {
         log: Arc<dyn ReplicatedLog>,
         node: NodeName,
     ) -> Result<MapVersion, ServiceError> {
-        let map = self.map(name).await?;
+        let map = self.map_here(name).await?;
         if map.folder.is_none() {
             return Err(map.no_journal("a map that nodes share"));
         }
@@ -178,7 +178,7 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::share_map`]; `ResourceExhausted` where there is no memory for the file.
     pub async fn log_base(&self, name: &MapName) -> Result<Option<(Base, Bytes)>, ServiceError> {
-        let map = self.map(name).await?;
+        let map = self.map_here(name).await?;
         let _reserved = self.inner.budget.reserve_transient(snapshot_bytes(&map.map), "a map file")?;
         let (tell, told) = oneshot::channel();
         self.act_on(name, SharedAct::Copy(tell)).await?;
@@ -191,7 +191,7 @@ impl MapService {
 
     /// None where there is more to do in another turn.
     async fn act_on(&self, name: &MapName, act: SharedAct) -> Result<Option<MapVersion>, ServiceError> {
-        let map = self.map(name).await?;
+        let map = self.map_here(name).await?;
         let outcome = map.commit_queue.submit(&Requester::from(&self.asker), Submission::Shared(act))?;
         self.outcome_of_act(&map, outcome).await
     }

@@ -2,12 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bytes::Bytes;
 use parking_lot::Mutex;
 use tokio_stream::StreamExt;
 
 use crate::caller::{AllowedMaps, AllowedScans};
-use crate::cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, SharedCatalog};
+use crate::cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, SharedCatalog};
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::replication::{MemoryLog, NodeLog, NodeName};
@@ -55,9 +54,13 @@ impl TwoNodes {
         a.other.service.set(b.service.clone()).unwrap();
         b.other.service.set(a.service.clone()).unwrap();
         let map = MapName::new("hall").unwrap();
-        let (info, _) = a.service.create_map(map.clone(), MapSettings::new(0.1, 3)).await.unwrap();
-        let file = a.service.snapshot_map(&map).await.unwrap();
-        b.service.copy_map(map.clone(), info.version.map_uuid, file.bytes).await.unwrap();
+        // A server by itself made it.
+        let alone = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let (info, _) = alone.create_map(map.clone(), MapSettings::new(0.1, 3)).await.unwrap();
+        let file = alone.snapshot_map(&map).await.unwrap().bytes;
+        for node in [&a, &b] {
+            node.service.copy_map(map.clone(), info.version.map_uuid, file.clone(), false).await.unwrap();
+        }
         let log = NodeLog(Arc::new(Mutex::new(MemoryLog::new(1))));
         for node in [&a, &b] {
             let (log, name) = (Arc::new(log.clone()), node.name.clone());
@@ -206,12 +209,12 @@ impl Forward for Other {
 }
 
 impl SharedCatalog for NoCatalog {
-    fn create<'a>(&'a self, _: &'a MapName, _: MapSettings) -> Later<'a, Result<bool, ServiceError>> {
+    fn enter<'a>(&'a self, _: &'a MapName, _: NewMap) -> Later<'a, Result<bool, ServiceError>> {
         none()
     }
 
-    fn restore<'a>(&'a self, _: &'a MapName, _: Bytes) -> Later<'a, Result<(), ServiceError>> {
-        none()
+    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, bool> {
+        Box::pin(std::future::ready(false))
     }
 
     fn delete<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<(), ServiceError>> {

@@ -1,5 +1,6 @@
 //! NATS servers and writers of a log.
 
+#[expect(dead_code, reason = "tests of whole nodes use the rest")]
 mod servers;
 mod skipped;
 mod writer;
