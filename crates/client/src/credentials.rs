@@ -1,6 +1,7 @@
 //! Credentials of a client: its key, its certificate, and the certificates that it trusts.
 
 use std::fmt;
+use std::sync::Arc;
 
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::service::Interceptor;
@@ -25,9 +26,14 @@ pub struct Credentials {
 #[derive(Clone, Default)]
 pub(super) struct Shown {
     key: Option<MetadataValue<Ascii>>,
-    /// The node that forwards the calls of its own callers.
+    /// What a node adds that forwards the calls of its own callers.
+    forwarded: Option<Arc<Forwarded>>,
+}
+
+/// Whose calls are forwarded, and by whom.
+#[derive(Debug)]
+struct Forwarded {
     node: Option<MetadataValue<Ascii>>,
-    /// The caller whose calls it forwards.
     caller: Option<MetadataValue<Ascii>>,
 }
 
@@ -95,14 +101,15 @@ impl Shown {
         // Their letters are those of a header.
         let value = |name: &str| MetadataValue::try_from(name).ok();
         let caller = caller.and_then(|caller| value(caller.as_str()));
-        Self { node: value(node.as_str()), caller, ..self }
+        Self { forwarded: Some(Arc::new(Forwarded { node: value(node.as_str()), caller })), ..self }
     }
 }
 
 impl Interceptor for Shown {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
-        let Self { key, node, caller } = self;
-        for (name, value) in [("authorization", key), (NODE, node), (CALLER, caller)] {
+        let Self { key, forwarded } = self;
+        let of_node = forwarded.as_deref().map(|Forwarded { node, caller }| [(NODE, node), (CALLER, caller)]);
+        for (name, value) in of_node.into_iter().flatten().chain([("authorization", &*key)]) {
             if let Some(value) = value {
                 request.metadata_mut().insert(name, value.clone());
             }
@@ -114,12 +121,8 @@ impl Interceptor for Shown {
 impl fmt::Debug for Shown {
     /// Says whether there is a key, without its value.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { key, node, caller } = self;
-        f.debug_struct("Shown")
-            .field("key", &key.is_some())
-            .field("node", node)
-            .field("caller", caller)
-            .finish()
+        let Self { key, forwarded } = self;
+        f.debug_struct("Shown").field("key", &key.is_some()).field("forwarded", forwarded).finish()
     }
 }
 

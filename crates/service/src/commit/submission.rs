@@ -66,6 +66,9 @@ pub(crate) struct Prepared {
     pub(crate) change: Change,
     /// Where there is a journal.
     pub(crate) record: Option<Record>,
+    /// The map's revision when it began to be decided on, or an earlier one. Where another node made changes since, it
+    /// may have made this one, under the same id.
+    pub(crate) seen: u64,
     /// True of a change that was decided on an empty map, and holds for no other.
     pub(crate) if_empty: bool,
     /// What a scan may still do when its turn comes.

@@ -45,6 +45,8 @@ pub(super) struct Worker {
     pub(super) published: Published,
     /// Its part in the log that several nodes share; none of a map that is this server's alone.
     pub(super) member: Option<Member>,
+    /// The last revision that was made because the log has it, and not in this node's own turn.
+    pub(super) received: u64,
     /// The log did not answer in this turn: what else waits in it is refused at once.
     pub(super) is_log_silent: bool,
     pub(super) stopped: Arc<OnceLock<Stop>>,
@@ -85,6 +87,7 @@ impl Worker {
             folder,
             published,
             member: None,
+            received: 0,
             is_log_silent: false,
             stopped,
             durations,
@@ -107,8 +110,12 @@ impl Worker {
             }
             match submission {
                 Submission::Prepared(prepared) => {
-                    let Prepared { mut change, mut record, if_empty, limits, robot_lock, reservation } =
+                    let Prepared { mut change, mut record, seen, if_empty, limits, robot_lock, reservation } =
                         *prepared;
+                    if seen < self.received {
+                        drop(answer.send(Err(Refusal::Stale)));
+                        continue;
+                    }
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {

@@ -52,6 +52,7 @@ impl HostedMap {
         stop: StopSignal<'_>,
     ) -> Result<Step<Option<Judged>>, ServiceError> {
         self.check_writable()?;
+        let seen = self.map.revision();
         let scan = FilteredScan::of(request, settings)?;
         let replayed = self.replay(&scan)?;
         if let Some(answer) = replayed {
@@ -102,7 +103,7 @@ impl HostedMap {
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let limits = TurnLimits { carved_at, viewpoint_bytes_max: settings.limits.viewpoint_bytes_max };
         let prepared =
-            Prepared { change, record, if_empty: located.is_first, limits, robot_lock, reservation };
+            Prepared { change, record, seen, if_empty: located.is_first, limits, robot_lock, reservation };
         let map = Arc::clone(self);
         let judged = Judged { answer: ScanAnswer { points_skipped, ..judged.answer }, ..judged };
         let answer = move |committed| Some(map.committed(judged, committed));

@@ -68,7 +68,7 @@ impl Attacker {
             )),
             Attack::Watches => http(format!("/v1/maps/{shared}/watch")),
             Attack::Connections => Err(FleetError::failed("nothing is asked there")),
-            _ => Ok(Connection::Grpc(self.aim.connect(self.attack.inserts()).await?.into())),
+            _ => Ok(Connection::Grpc(self.aim.connect(self.attack.inserts()).await?)),
         }
     }
 
@@ -111,6 +111,6 @@ impl Attacker {
 
 /// The way to the server.
 enum Connection {
-    Grpc(Box<Client>),
+    Grpc(Client),
     Http(Box<HttpConnection>),
 }

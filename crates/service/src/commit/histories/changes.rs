@@ -34,11 +34,18 @@ pub(super) fn change_of(number: i32, is_large: bool) -> Change {
     Change::Insertion(ScanRecord::of_voxels(pose, voxels))
 }
 
+/// A change that was decided on now.
 pub(super) fn prepared(change: Change) -> Submission {
+    prepared_at(u64::MAX, change)
+}
+
+/// A change that was decided on at a revision.
+pub(super) fn prepared_at(seen: u64, change: Change) -> Submission {
     let robot_lock = Arc::new(tokio::sync::Mutex::new(())).try_lock_owned().unwrap();
     Submission::Prepared(Box::new(Prepared {
         record: Some(record_of(&change).unwrap()),
         change,
+        seen,
         if_empty: false,
         limits: TurnLimits { carved_at: 0, viewpoint_bytes_max: 0 },
         robot_lock: Arc::new(robot_lock),

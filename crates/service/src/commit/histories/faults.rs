@@ -6,7 +6,7 @@ use parking_lot::Mutex;
 use tokio::sync::oneshot;
 use uuid::Uuid;
 
-use super::changes::{MAP, change_of, marker, prepared, settings};
+use super::changes::{MAP, change_of, marker, prepared, prepared_at, settings};
 use super::history::History;
 use super::node::{NODES, Node, Process, simulated};
 use crate::commit::submission::{Outcome, Refusal, SharedAct, Submission, Waiting, record_of};
@@ -367,4 +367,27 @@ fn a_node_that_could_compare_nothing_gives_no_base() {
     history.nodes[2].process.as_mut().unwrap().act(SharedAct::Base(tell)).unwrap();
     let base = told.try_recv().unwrap();
     assert!(base.is_none(), "a base of a history that is not the log's");
+}
+
+/// Seen with real nodes: a scan waited for its turn at a node that lost the lead and took it over again; meanwhile it had
+/// been sent again to another, and was made by that. Its id is looked for again.
+#[test]
+fn a_change_that_was_decided_on_before_another_node_made_changes_is_decided_on_again() {
+    let mut history = begun();
+    lead(&mut history, 0).unwrap();
+    made(&mut history, 0, &[0]);
+    let process = history.nodes[0].process.as_mut().unwrap();
+    let (seen, to) = (process.map.revision(), NodeName::new("node-1").unwrap());
+    process.act(SharedAct::HandOver(to)).unwrap();
+    follow(&mut history, 1).unwrap();
+    lead(&mut history, 1).unwrap();
+    made(&mut history, 1, &[1]);
+    follow(&mut history, 0).unwrap();
+    lead(&mut history, 0).unwrap();
+    let process = history.nodes[0].process.as_mut().unwrap();
+    let again = process.commit(vec![prepared_at(seen, change_of(1, false))]).remove(0);
+    assert!(matches!(again, Err(Refusal::Stale)), "{again:?}");
+    let now = process.map.revision();
+    let other = process.commit(vec![prepared_at(now, change_of(2, false))]).remove(0);
+    assert!(other.is_ok(), "{other:?}");
 }

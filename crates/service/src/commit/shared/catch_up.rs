@@ -131,6 +131,7 @@ impl Worker {
         }
         self.append(&[record])?;
         self.apply(change, |_| {});
+        self.received = revision;
         Ok(())
     }
 }
