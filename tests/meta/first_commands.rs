@@ -33,7 +33,7 @@ const VENV: &str = "python3 -m venv target/venv && . target/venv/bin/activate";
 /// A page, its first shell command, and how that is run.
 type Row = (&'static str, &'static str, RunBy);
 
-const PAGES: [Row; 24] = [
+const PAGES: [Row; 25] = [
     (".ci/README.md", "", Nothing),
     ("README.md", "cargo run --release -- demo", DEMO),
     ("clients/c/README.md", "cargo build --release -p mrol-c", FirstCommands(LONG)),
@@ -56,6 +56,11 @@ const PAGES: [Row; 24] = [
         "docs/guide/api.md",
         "grpcurl -plaintext -d '{\"map\":\"office\",\"points\":{\"xyz\":[1.01,2.01,0.51]}}' \\",
         OfOthers,
+    ),
+    (
+        "docs/guide/cluster.md",
+        "mkdir -p target/tour/cluster && cd target/tour/cluster && umask 077 && rm -f keys.toml",
+        Documents,
     ),
     ("docs/guide/files.md", "mkdir -p target/tour", Documents),
     ("docs/guide/frames.md", "mrol map --help | grep -A3 -e --axes -e --sensor-height", Documents),
