@@ -132,6 +132,11 @@ impl Connection {
     }
 }
 
+/// How often a server that is asked something is looked for, where another could be asked instead,
+const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(2);
+/// and how long it may take to answer that, before its connection counts as lost.
+const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
+
 /// Where a server is, and how it is connected to.
 #[derive(Debug, Clone)]
 pub(super) struct Address {
@@ -150,10 +155,10 @@ impl Address {
         Ok(Self { url, endpoint })
     }
 
-    /// The same, where a peer that is gone is found out within `interval` and `timeout`.
-    pub(super) fn with_keepalive(self, interval: Duration, timeout: Duration) -> Self {
-        let endpoint = self.endpoint.http2_keep_alive_interval(interval).keep_alive_timeout(timeout);
-        Self { endpoint, ..self }
+    /// The same, where a server that does not answer any more is found out within seconds.
+    pub(super) fn with_keepalive(self) -> Self {
+        let endpoint = self.endpoint.http2_keep_alive_interval(KEEPALIVE_INTERVAL);
+        Self { endpoint: endpoint.keep_alive_timeout(KEEPALIVE_TIMEOUT), ..self }
     }
 
     /// A channel that connects when it is used. It must be called in a runtime.

@@ -11,11 +11,6 @@ use super::servers::Servers;
 use mrol_map::map::CallerName;
 use mrol_service::replication::NodeName;
 
-/// How often a node that is asked something is looked for,
-const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(2);
-/// and how long it may take to answer, before its connection counts as lost.
-const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
-
 /// A connection by which a node of a cluster forwards what its own callers ask. The other node believes what it says of
 /// them for the secret of the cluster, which is the key of its [`Credentials`]: without that it says nothing to
 /// anybody.
@@ -39,7 +34,7 @@ impl NodeClient {
         own: NodeName,
         timeout: Duration,
     ) -> Result<Self, ClientError> {
-        let address = Address::parse(url, credentials)?.with_keepalive(KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT);
+        let address = Address::parse(url, credentials)?.with_keepalive();
         let connection = address.connect(credentials, timeout).await?.replaceable();
         Ok(Self { connection, node: own })
     }

@@ -37,7 +37,8 @@ impl Servers {
         if let [only] = addresses[..] {
             return Ok(Self::One(Connection::open(only, credentials).await?));
         }
-        let parse = |url: &str| Address::parse(url, credentials);
+        // A server that is stopped, or cut off, is left like one that is gone.
+        let parse = |url: &str| Address::parse(url, credentials).map(Address::with_keepalive);
         let addresses: Vec<Address> = addresses.into_iter().map(parse).collect::<Result<_, _>>()?;
         let used = Mutex::new(Used { connections: vec![None; addresses.len()], current: 0 });
         let several = Several {

@@ -40,6 +40,8 @@ pub(super) struct Known<'a> {
     pub(super) view: &'a View,
     /// Its own beats since it has seen no node lead the map.
     pub(super) waited: u64,
+    /// Version of the records that it writes.
+    pub(super) record_version: u32,
 }
 
 /// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart by
@@ -53,16 +55,19 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
             }
         }
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
+        // What it would write, not all could read: nodes are exchanged one by one.
+        Lead::Shared { .. } if known.view.reads_least() < known.record_version => Choice::Stay,
         Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
         _ => Choice::Stay,
     }
 }
 
-/// True where another node leads, or may be about to.
+/// True where another node leads, or may be about to. One that the log names and that does not take over is not waited
+/// for for ever: it may not be able to.
 fn is_led_elsewhere(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
     let Some(leader) = leader.filter(|leader| *leader != known.own) else { return false };
-    let has_it = known.view.holders(known.map).any(|(node, _)| node == leader);
-    has_it || (known.view.is_live(leader) && known.waited < PATIENCE)
+    let leads = known.view.holders(known.map).any(|(node, head)| node == leader && head.leads);
+    leads || (known.view.is_live(leader) && known.waited < PATIENCE)
 }
 
 /// True of the node that is furthest; of several, of the one that leads by the log, is wished, or has the first name.
@@ -103,14 +108,14 @@ mod tests {
     fn view(others: &[(&str, bool, Option<u64>, bool)]) -> View {
         let seen = |&(name, is_live, revision, is_parted): &(&str, bool, Option<u64>, bool)| {
             let head = |revision| {
-                let head = MapHead { revision, epoch: 1, sequence: revision, leads: false, is_parted };
+                let head = MapHead { revision, epoch: 1, sequence: revision, leads: !is_parted, is_parted };
                 (MAP, head)
             };
             let beat = Beat {
                 http: String::new(),
                 grpc: String::new(),
                 version: String::new(),
-                record_version: 0,
+                record_version: 7,
                 maps: revision.map(head).into_iter().collect(),
                 free_bytes: 0,
             };
@@ -132,7 +137,18 @@ mod tests {
     ) -> Choice {
         let (own, wished, view) = (node("b"), wished.map(node), view(others));
         let (wished, view) = (wished.as_ref(), &view);
-        choose(&Known { own: &own, map: MAP, revision: 5, sequence_before: 5, lead, wished, view, waited })
+        let known = Known {
+            own: &own,
+            map: MAP,
+            revision: 5,
+            sequence_before: 5,
+            lead,
+            wished,
+            view,
+            waited,
+            record_version: 7,
+        };
+        choose(&known)
     }
 
     #[test]
@@ -165,6 +181,26 @@ mod tests {
         assert_eq!(chosen(&lead, &[("a", true, None, false)], 0, None), Choice::Stay);
         assert_eq!(chosen(&lead, &[("a", true, None, false)], PATIENCE, None), Choice::Claim);
         assert_eq!(chosen(&lead, &[("a", true, Some(5), true)], PATIENCE, None), Choice::Claim);
+    }
+
+    #[test]
+    fn who_writes_what_another_cannot_read_does_not_lead() {
+        let (own, gone) = (node("b"), ("a", false, Some(5), false));
+        let view = view(&[gone, ("c", true, Some(5), false)]);
+        let lead = led_by(Some("a"), false);
+        let known = |record_version| Known {
+            own: &own,
+            map: MAP,
+            revision: 5,
+            sequence_before: 5,
+            lead: &lead,
+            wished: None,
+            view: &view,
+            waited: PATIENCE,
+            record_version,
+        };
+        assert_eq!(choose(&known(7)), Choice::Claim);
+        assert_eq!(choose(&known(8)), Choice::Stay);
     }
 
     #[test]

@@ -23,6 +23,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// Keeps this node's copy of one map: takes it in where it has none, shares it by its log, and leads it where it is to.
 pub(super) struct Keeper {
     pub(super) node: NodeName,
+    /// Version of the records that it writes.
+    pub(super) record_version: u32,
     pub(super) service: MapService,
     pub(super) joined: Joined,
     pub(super) name: MapName,
@@ -118,7 +120,7 @@ impl Keeper {
             let leader_is_seen = match &now {
                 Lead::Shared { is_here: true, .. } => true,
                 Lead::Shared { leader: Some(leader), .. } => {
-                    view.holders(self.uuid).any(|(node, _)| node == leader)
+                    view.holders(self.uuid).any(|(node, head)| node == leader && head.leads)
                 }
                 _ => false,
             };
@@ -136,6 +138,7 @@ impl Keeper {
                 wished: wished.as_ref(),
                 view: &view,
                 waited: view.beats - since,
+                record_version: self.record_version,
             };
             let choice = choose(&known);
             self.act(choice, &view).await;

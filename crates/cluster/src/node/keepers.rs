@@ -12,6 +12,7 @@ use uuid::Uuid;
 
 use super::joined::{Joined, blocking};
 use super::keeper::Keeper;
+use super::settings::NodeSettings;
 use super::view::View;
 use crate::catalog::Listing;
 use crate::jetstream_log::JetStreamLog;
@@ -39,6 +40,7 @@ pub(super) struct Wish {
 /// One keeper for each map of the cluster's list.
 pub(super) struct Keepers {
     node: NodeName,
+    record_version: u32,
     service: MapService,
     joined: Joined,
     view: watch::Receiver<View>,
@@ -63,12 +65,14 @@ impl Drop for Kept {
 
 impl Keepers {
     pub(super) fn new(
-        node: NodeName,
+        settings: &NodeSettings,
         service: MapService,
         joined: Joined,
         view: watch::Receiver<View>,
     ) -> Self {
-        Self { node, service, joined, view, kept: BTreeMap::new(), revision: 0, deleted: BTreeMap::new() }
+        let (node, record_version) = (settings.name.clone(), settings.record_version);
+        let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
+        Self { node, record_version, service, joined, view, kept, revision: 0, deleted }
     }
 
     /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
@@ -156,6 +160,7 @@ impl Keepers {
         let (wished, heard) = watch::channel(wished);
         let keeper = Keeper {
             node: self.node.clone(),
+            record_version: self.record_version,
             service: self.service.clone(),
             joined: self.joined.clone(),
             name: name.clone(),

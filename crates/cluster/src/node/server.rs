@@ -19,6 +19,7 @@ use super::joined::{Joined, NotJoined, blocking};
 use super::keepers::{Keepers, Wish};
 use super::settings::NodeSettings;
 use super::view::View;
+use crate::beat::MapHead;
 use crate::engine::ConnectError;
 use crate::forwarder::Forwarder;
 
@@ -104,7 +105,7 @@ impl Node {
                 return tracing::error!(%error, "no thread for the node's beats: it takes no part in the cluster");
             }
         }
-        let keepers = Keepers::new(self.settings.name.clone(), service, joined, self.view.subscribe());
+        let keepers = Keepers::new(&self.settings, service, joined, self.view.subscribe());
         keepers.keep(heard).await;
     }
 
@@ -160,7 +161,11 @@ impl Node {
         for map in led(service) {
             let view = self.view.borrow().clone();
             let holders = view.holders(map.version.map_uuid);
-            let Some((node, _)) = holders.max_by_key(|(_, head)| head.sequence) else { continue };
+            // Those of an older version read less than a newer one would write.
+            let version = |node: &NodeName| view.others[node].beat.record_version;
+            let first =
+                |(node, head): &(&NodeName, &MapHead)| (std::cmp::Reverse(version(node)), head.sequence);
+            let Some((node, _)) = holders.max_by_key(first) else { continue };
             let over = service.hand_map_over(&map.name, node.clone());
             match tokio::time::timeout(until.saturating_duration_since(Instant::now()), over).await {
                 Ok(Ok(_)) => handed.push(map.name),

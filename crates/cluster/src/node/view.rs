@@ -34,6 +34,12 @@ impl View {
         })
     }
 
+    /// The least version of records that the other live nodes read.
+    pub(super) fn reads_least(&self) -> u32 {
+        let live = self.others.values().filter(|seen| seen.is_live);
+        live.map(|seen| seen.beat.record_version).min().unwrap_or(u32::MAX)
+    }
+
     /// True of another node that is live.
     pub(super) fn is_live(&self, node: &NodeName) -> bool {
         self.others.get(node).is_some_and(|seen| seen.is_live)
