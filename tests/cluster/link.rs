@@ -10,6 +10,9 @@ use std::time::Duration;
 /// How often a connection looks whether it is cut.
 const LOOKED_EVERY: Duration = Duration::from_millis(20);
 
+/// How often it takes connections.
+const ACCEPTED_EVERY: Duration = Duration::from_millis(5);
+
 /// What listens at a port, and passes on to another what comes. Cut, it takes connections and passes nothing on: like a
 /// network that drops packets, and unlike a port that refuses.
 pub(crate) struct Link {
@@ -20,6 +23,8 @@ pub(crate) struct Link {
 #[derive(Default)]
 struct State {
     is_cut: AtomicBool,
+    /// True while it listens at no port, as where its target has ended.
+    is_closed: AtomicBool,
     /// How often it was mended: connections from before end then.
     mended: AtomicU64,
 }
@@ -31,13 +36,18 @@ impl Link {
         let port = listener.local_addr().unwrap().port();
         let state = Arc::<State>::default();
         let of_all = Arc::clone(&state);
-        thread::spawn(move || {
-            for incoming in listener.incoming() {
-                let (Ok(incoming), state) = (incoming, Arc::clone(&of_all)) else { return };
-                thread::spawn(move || pass_on(incoming, target, &state));
-            }
-        });
+        thread::spawn(move || listen(listener, port, target, &of_all));
         Self { port, state }
+    }
+
+    /// From now on its port refuses connections.
+    pub(crate) fn close(&self) {
+        self.state.is_closed.store(true, Ordering::Release);
+    }
+
+    /// From now on its port takes connections.
+    pub(crate) fn open(&self) {
+        self.state.is_closed.store(false, Ordering::Release);
     }
 
     /// Where it listens.
@@ -54,6 +64,24 @@ impl Link {
     pub(crate) fn mend(&self) {
         self.state.mended.fetch_add(1, Ordering::AcqRel);
         self.state.is_cut.store(false, Ordering::Release);
+    }
+}
+
+fn listen(listener: TcpListener, port: u16, target: u16, state: &Arc<State>) {
+    let mut listener = Some(listener);
+    loop {
+        thread::sleep(ACCEPTED_EVERY);
+        if state.is_closed.load(Ordering::Acquire) {
+            listener = None;
+            continue;
+        }
+        let open = listener.get_or_insert_with(|| TcpListener::bind(("127.0.0.1", port)).unwrap());
+        open.set_nonblocking(true).unwrap();
+        while let Ok((incoming, _)) = open.accept() {
+            incoming.set_nonblocking(false).unwrap();
+            let state = Arc::clone(state);
+            thread::spawn(move || pass_on(incoming, target, &state));
+        }
     }
 }
 

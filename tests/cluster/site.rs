@@ -81,12 +81,14 @@ impl Site {
             .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
             .stdout(Stdio::null())
             .stderr(log);
+        node.from_others.open();
         node.process = Some(command.spawn().unwrap());
     }
 
     /// Kills a node with -9.
     pub(crate) fn kill_node(&mut self, index: usize) {
         if let Some(mut process) = self.nodes[index].process.take() {
+            self.nodes[index].from_others.close();
             process.kill().unwrap();
             process.wait().unwrap();
         }
@@ -107,6 +109,7 @@ impl Site {
             assert!(begun.elapsed() < WITHIN, "node {index} does not end: {}", self.log_of(index));
             std::thread::sleep(Duration::from_millis(20));
         }
+        self.nodes[index].from_others.close();
     }
 
     /// Cuts a node off from NATS, and the other nodes from it.

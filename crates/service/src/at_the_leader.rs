@@ -29,6 +29,10 @@ const TRIED_FOR: Duration = Duration::from_secs(5);
 const PAUSE_MIN: Duration = Duration::from_millis(50);
 const PAUSE_MAX: Duration = Duration::from_millis(200);
 
+/// How long after it has lost the lead a node that was asked is waited for: one that handed it over answers, and one that
+/// was stopped does not.
+const ANSWERED_WITHIN: Duration = Duration::from_millis(500);
+
 /// Where an operation of which the leader makes the changes is made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Maker {
@@ -65,6 +69,12 @@ impl MapService {
         let mut lead = map.commit_queue.lead();
         // The sender is there as long as the map is.
         drop(lead.wait_for(|lead| Maker::of(lead, &cluster.node) != *maker).await);
+    }
+
+    /// Waits until the node that was asked has lost the lead, and has not answered for a while after.
+    async fn answered_no_more(&self, map: &HostedMap, asked: &Maker) {
+        self.maker_changed(map, asked).await;
+        tokio::time::sleep(ANSWERED_WITHIN).await;
     }
 
     /// How the node that leads is asked, where that is another: not for a call that was forwarded itself.
@@ -113,7 +123,13 @@ impl MapService {
                 },
                 Maker::There(leader) if self.is_forwarded => Some(not_leader(&map.name, Some(leader))),
                 Maker::There(leader) => {
-                    match there(Arc::clone(&cluster.forward), self.call_to(leader.clone(), map)).await {
+                    let asked = there(Arc::clone(&cluster.forward), self.call_to(leader.clone(), map));
+                    let answer = tokio::select! {
+                        biased;
+                        answer = asked => answer,
+                        () = self.answered_no_more(map, &maker) => Err(not_answered(map, leader)),
+                    };
+                    match answer {
                         Err(error) if leads_no_more(&error) => Some(error),
                         outcome => return outcome,
                     }
@@ -127,6 +143,16 @@ impl MapService {
             pause = PAUSE_MAX.min(2 * pause);
         }
     }
+}
+
+/// That a node lost the lead before it answered.
+fn not_answered(map: &HostedMap, leader: &NodeName) -> ServiceError {
+    let message = format!(
+        "this change of map {} was sent to node {leader}, which did not answer, and another leads now: it may be there; the same \
+         scan_id or request_id, sent again, tells",
+        map.name
+    );
+    ServiceError::new(Reason::OutcomeUnknown, message).retry_after(PAUSE_MIN)
 }
 
 /// True of a refusal after which another node may lead, or this one: nothing was changed.

@@ -212,3 +212,19 @@ async fn a_watch_of_events_moves_with_the_lead_and_tells_each_event_once() {
     nodes.a.service.insert_scan(&nodes.map, scan_of("third", 2.05)).await.unwrap();
     assert_eq!(next_robot().await, "third");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_leader_that_does_not_answer_is_waited_for_until_another_leads() {
+    let nodes = TwoNodes::led_by_a().await;
+    *nodes.b.other.is_silent.lock() = true;
+    let (service, map) = (nodes.b.service.clone(), nodes.map.clone());
+    let asked = tokio::spawn(async move { service.insert_scan(&map, scan_of("r", 0.05)).await });
+    while nodes.b.asked().is_empty() {
+        tokio::task::yield_now().await;
+    }
+    nodes.hand_over().await;
+    nodes.take_over().await;
+    let unknown = asked.await.unwrap().unwrap_err();
+    assert_eq!(unknown.reason, Reason::OutcomeUnknown);
+    assert!(nodes.b.service.insert_scan(&nodes.map, scan_of("r", 0.05)).await.unwrap().accepted);
+}

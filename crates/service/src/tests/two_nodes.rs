@@ -41,6 +41,8 @@ pub(super) struct Other {
     service: OnceLock<MapService>,
     /// What every call fails with, in the place of asking.
     pub(super) fails_with: Mutex<Option<ServiceError>>,
+    /// True of a node that never answers.
+    pub(super) is_silent: Mutex<bool>,
     /// All calls, with what was asked.
     pub(super) calls: Mutex<Vec<(&'static str, ForwardedCall)>>,
 }
@@ -133,6 +135,9 @@ impl Other {
     {
         self.calls.lock().push((asked, call.clone()));
         let failure = self.fails_with.lock().clone();
+        if *self.is_silent.lock() {
+            return Box::pin(std::future::pending());
+        }
         if let Some(error) = failure {
             return Box::pin(std::future::ready(Err(error)));
         }
