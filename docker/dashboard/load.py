@@ -1,14 +1,17 @@
-"""A server that has something to say on every panel: with keys, TLS, a map that cannot be opened, and callers of all kinds."""
+"""Servers that have something to say on every panel: one with keys, TLS, a map that cannot be opened, and callers of all
+kinds; and a node of a cluster."""
 
 import http.client
 import json
 import os
 import random
 import signal
+import socket
 import ssl
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,18 +37,22 @@ class Server:
             MROL_LIMITS__CALLER_REQUESTS_PER_S_MAX=str(REQUESTS_PER_S_MAX),
             MROL_LIMITS__CALLER_BURST_MAX=str(REQUESTS_PER_S_MAX),
         )
+        self.process, self.address = self.start(binary, data, environment)
+
+    def start(self, binary, data, environment):
+        """Starts a server with the keys and the certificate of this one: its process and its address."""
         options = ["--json", "--data-dir", data, "--keys-file", self.folder / "keys.toml"]
         options += ["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"]
         options += ["--tls-certificate", self.certificate, "--tls-key", self.folder / "tls.key"]
-        self.log = self.folder / "serve.log"
-        with self.log.open("w") as log:
-            self.process = subprocess.Popen(
-                [binary, "serve", *options], stdout=subprocess.PIPE, stderr=log, env=environment, text=True
+        log = data.with_suffix(".log")
+        with log.open("w") as file:
+            process = subprocess.Popen(
+                [binary, "serve", *options], stdout=subprocess.PIPE, stderr=file, env=environment, text=True
             )
-        first = self.process.stdout.readline()
+        first = process.stdout.readline()
         if not first:
-            sys.exit(f"the server ended:\n{self.log.read_text()}")
-        self.address = json.loads(first)["http"].split("//")[-1]
+            sys.exit(f"the server ended:\n{log.read_text()}")
+        return process, json.loads(first)["http"].split("//")[-1]
 
     def _new_key(self, binary, name, scope):
         command = [binary, "key", "new", "--name", name, "--scope", scope, "--file", self.folder / "keys.toml"]
@@ -61,9 +68,9 @@ class Server:
         subprocess.run(command, check=True, capture_output=True)
         return file
 
-    def connection(self):
+    def connection(self, address=None):
         context = ssl.create_default_context(cafile=self.certificate)
-        return http.client.HTTPSConnection(self.address, timeout=60, context=context)
+        return http.client.HTTPSConnection(address or self.address, timeout=60, context=context)
 
 
 # Names and scopes of the keys. Limits count by key: the noisy caller's burst leaves the others alone.
@@ -85,6 +92,59 @@ def server_under_load(binary, folder):
         load.stopped.set()
         server.process.terminate()
         server.process.wait()
+
+
+@contextmanager
+def node_of_a_cluster(binary, nats_program, server):
+    """A node with the keys and the certificate of the server, that leads a map by way of one NATS server: its address."""
+    folder = server.folder
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    conf = f'listen: "127.0.0.1:{port}"\njetstream {{ store_dir: "{folder}/nats", sync_interval: always }}\n'
+    (folder / "nats.conf").write_text(conf)
+    command = [nats_program, "--config", folder / "nats.conf", "--log", folder / "nats.log"]
+    processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)]
+    try:
+        (folder / "cluster.secret").write_text("a secret of the check, and of nobody else".replace(" ", "-"))
+        environment = dict(
+            os.environ,
+            MROL_CLUSTER__NATS=f'["nats://127.0.0.1:{port}"]',
+            MROL_CLUSTER__NODE="n1",
+            MROL_CLUSTER__SECRET_FILE=str(folder / "cluster.secret"),
+            MROL_CLUSTER__REPLICAS="1",
+        )
+        process, address = server.start(binary, folder / "node", environment)
+        processes.append(process)
+        ask = asking_of(server.connection(address), server.keys["operator"])
+        deadline = time.monotonic() + 30
+        while ask("GET", "/readyz")[0] != 200:
+            if time.monotonic() > deadline:
+                sys.exit(f"the node does not join:\n{(folder / 'node.log').read_text()}")
+            time.sleep(0.2)
+        for method, path, body in [
+            ("PUT", "/v1/maps/yard", {"resolution_m": 0.2}),
+            ("POST", "/v1/maps/yard/scans", _body("mower", [[1.0, 2.0, 0.5]], (0.0, 0.0)) | {"align": False}),
+        ]:
+            status, text = ask(method, path, body)
+            if status not in (200, 201):
+                sys.exit(f"{method} {path} of the node: {status} {text}")
+        yield address
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+            process.wait()
+
+
+def asking_of(connection, secret):
+    """A function that asks over this connection: the status and the text of the answer."""
+
+    def ask(method, path, body=None):
+        headers = {"content-type": "application/json", "authorization": f"Bearer {secret}"}
+        connection.request(method, path, body and json.dumps(body), headers)
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode(errors="replace")
+
+    return ask
 
 
 class Load:

@@ -13,7 +13,7 @@ use super::forms::NoParams;
 use super::middleware::Service;
 use super::operations::UnavailableResponse;
 use crate::access::Authorized;
-use crate::telemetry::Metrics;
+use crate::telemetry::{Metrics, ServiceReading};
 use mrol_service::MapService;
 use mrol_store::Opened;
 
@@ -151,11 +151,12 @@ async fn scrape(metrics: &Metrics, service: &MapService) -> String {
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    metrics.render(
-        &service.lanes(),
-        &service.map_names(),
-        &maps,
-        service.maps_awake(),
-        &service.unavailable_maps(),
-    )
+    metrics.render(&ServiceReading {
+        lanes: service.lanes().to_vec(),
+        names: service.map_names(),
+        maps,
+        awake: service.maps_awake(),
+        unavailable: service.unavailable_maps(),
+        shared: service.shared_maps(),
+    })
 }

@@ -225,12 +225,12 @@ impl Server {
             }
         }
         let mut opening = Opening::begin(service.clone(), wanted, health).await;
-        membership.begin(&service, &lifecycle, &config.cluster);
+        membership.begin(&service, &lifecycle);
         tracing::info!(http = %http_tcp.address, grpc = %grpc_tcp.address, "serving");
         let admin_sockets = admin_tcp.map(|tcp| (&admin, tcp, None));
         let sockets = [(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)];
         let mut accepting = accept(sockets.into_iter().chain(admin_sockets));
-        let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
+        let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission, membership.clone()));
         let looking = tokio::spawn(files.look_after(lifecycle.clone()));
         let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
 

@@ -15,13 +15,24 @@ use super::error::ServerError;
 use crate::access::{Access, read_cluster_secret};
 use crate::admission::Lifecycle;
 use crate::config::{ClusterConfig, Config, advertised};
+use crate::telemetry::NodeReading;
 
 /// How often it is looked whether the node is behind.
 const LOOKED_EVERY: Duration = Duration::from_secs(1);
 
-/// A server's part in a cluster; nothing of a server by itself.
-#[derive(Debug, Default)]
-pub(super) struct Membership(Option<Arc<Node>>);
+/// How long after the last beat that NATS acknowledged a node still counts as joined: five beats.
+const JOINED_FOR: Duration = Duration::from_secs(10);
+
+/// A server's part in a cluster; nothing of a server by itself. A clone is the same part.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Membership(Option<Member>);
+
+#[derive(Debug, Clone)]
+struct Member {
+    node: Arc<Node>,
+    /// How far behind the others it may be.
+    lag_max: Duration,
+}
 
 impl Membership {
     /// How long a node may take to hand its maps over when it is told to end.
@@ -64,19 +75,20 @@ impl Membership {
             engine: engine_settings(cluster, name.as_str()),
             name,
         };
-        Ok((Self(Some(Node::new(settings, forwarder))), access))
+        let (node, lag_max) = (Node::new(settings, forwarder), cluster.lag_max());
+        Ok((Self(Some(Member { node, lag_max })), access))
     }
 
     /// What the operations of the service have of it.
     pub(super) fn cluster(&self) -> Option<Cluster> {
-        self.0.as_ref().map(|node| node.cluster())
+        self.0.as_ref().map(|member| member.node.cluster())
     }
 
     /// Begins to work; `lifecycle` is told when the node is behind the others for longer than the settings allow.
-    pub(super) fn begin(&self, service: &MapService, lifecycle: &Lifecycle, config: &ClusterConfig) {
-        let Some(node) = &self.0 else { return };
+    pub(super) fn begin(&self, service: &MapService, lifecycle: &Lifecycle) {
+        let Some(Member { node, lag_max }) = self.0.clone() else { return };
         node.begin(service.clone());
-        let (node, lifecycle, lag_max) = (Arc::clone(node), lifecycle.clone(), config.lag_max());
+        let lifecycle = lifecycle.clone();
         tokio::spawn(async move {
             let mut due = interval(LOOKED_EVERY);
             while !lifecycle.is_draining() {
@@ -86,16 +98,32 @@ impl Membership {
         });
     }
 
+    /// What it knows of the cluster, for the metrics.
+    pub(super) fn reading(&self) -> Option<NodeReading> {
+        let Member { node, lag_max } = self.0.as_ref()?;
+        let status = node.status();
+        let gone = status.gone.len();
+        Some(NodeReading {
+            is_joined: status.seen.is_some_and(|seen| seen <= JOINED_FOR),
+            is_behind: node.is_behind(*lag_max),
+            live: status.grpc.len() + 1 - gone,
+            gone,
+            furthest: status.furthest,
+            takeovers: status.takeovers,
+            acknowledgments: status.acknowledgments,
+        })
+    }
+
     /// Hands the maps that it leads over to other nodes.
     pub(super) async fn leave(&self, service: &MapService) {
-        if let Some(node) = &self.0 {
+        if let Some(Member { node, .. }) = &self.0 {
             node.leave(service).await;
         }
     }
 
     /// Ends its work.
     pub(super) async fn end(&self) {
-        if let Some(node) = &self.0 {
+        if let Some(Member { node, .. }) = &self.0 {
             node.end().await;
         }
     }

@@ -8,10 +8,11 @@ use mrol_service::{Cluster, MapService};
 use super::error::ServerError;
 use crate::access::Access;
 use crate::admission::Lifecycle;
-use crate::config::{ClusterConfig, Config};
+use crate::config::Config;
+use crate::telemetry::NodeReading;
 
 /// A server's part in a cluster: none.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Membership;
 
 impl Membership {
@@ -39,7 +40,12 @@ impl Membership {
     }
 
     /// Nothing begins.
-    pub(super) fn begin(&self, _: &MapService, _: &Lifecycle, _: &ClusterConfig) {}
+    pub(super) fn begin(&self, _: &MapService, _: &Lifecycle) {}
+
+    /// Nothing is known.
+    pub(super) fn reading(&self) -> Option<NodeReading> {
+        None
+    }
 
     /// Nothing is handed over.
     pub(super) async fn leave(&self, _: &MapService) {}

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::membership::Membership;
 use crate::admission::Admission;
 use crate::telemetry::Metrics;
 use mrol_service::MapService;
@@ -13,9 +14,14 @@ const INTERVAL: Duration = Duration::from_secs(1);
 /// The size of a block so large that the allocator has it from the system, and not from what it keeps for small ones.
 const LARGE_BLOCK: usize = 4 << 20;
 
-/// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of
-/// its own: a snapshot that takes long does not keep it from looking.
-pub(super) async fn watch(service: MapService, metrics: Metrics, admission: Admission) {
+/// Measures disk and memory, looks what a node knows of its cluster, ends what is silent, and tells the metrics, until
+/// the server is draining. It is a task of its own: a snapshot that takes long does not keep it from looking.
+pub(super) async fn watch(
+    service: MapService,
+    metrics: Metrics,
+    admission: Admission,
+    membership: Membership,
+) {
     let mut looking = interval(INTERVAL);
     looking.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -25,6 +31,9 @@ pub(super) async fn watch(service: MapService, metrics: Metrics, admission: Admi
         }
         admission.sweep();
         metrics.in_use(&admission.in_use());
+        if let Some(node) = membership.reading() {
+            metrics.node(node);
+        }
         measure(&service, &metrics).await;
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn write_lanes(text: &mut String, lanes: &[LaneUse]) {
     let what = "Seconds that jobs waited for a thread, by pool";
     let mut family = Family::begin(text, "mrol_job_wait_seconds", Kind::Histogram, what);
     for lane in lanes {
-        family.histogram(("pool", &lane.name), &lane.waits);
+        family.histogram(&[("pool", &lane.name)], &lane.waits);
     }
 }
 
@@ -194,7 +194,7 @@ fn write_storage(text: &mut String, maps: &[MapInfo]) {
         (
             "mrol_map_read_only",
             Kind::Gauge,
-            "1 where the journal failed and the map takes no changes, by map",
+            "1 where the map takes no changes since the journal failed, or histories differ, by map",
             |s| f64::from(u8::from(s.failure.is_some())),
         ),
         ("mrol_journal_records_total", Kind::Counter, "Records appended, by map", |s| {
@@ -211,18 +211,18 @@ fn write_storage(text: &mut String, maps: &[MapInfo]) {
     let what = "Seconds that syncs of the journal took, by map";
     let mut family = Family::begin(text, "mrol_journal_sync_seconds", Kind::Histogram, what);
     for (map, storage) in kept() {
-        family.histogram(("map", map), &storage.journal.syncs);
+        family.histogram(&[("map", map)], &storage.journal.syncs);
     }
     let what = "Seconds from a group of changes in hand to durable and visible, by map";
     let mut family = Family::begin(text, "mrol_commit_seconds", Kind::Histogram, what);
     for map in maps {
-        family.histogram(("map", &map.name), &map.commits);
+        family.histogram(&[("map", &map.name)], &map.commits);
     }
 }
 
 /// What Prometheus makes of a family.
 #[derive(Debug, Clone, Copy)]
-enum Kind {
+pub(super) enum Kind {
     /// Goes up and down.
     Gauge,
     /// Counts since the start; its name ends with `_total`.
@@ -242,31 +242,33 @@ impl Kind {
 }
 
 /// One metric name with its samples.
-struct Family<'a> {
+pub(super) struct Family<'a> {
     text: &'a mut String,
     name: &'static str,
 }
 
 impl<'a> Family<'a> {
-    fn begin(text: &'a mut String, name: &'static str, kind: Kind, what: &str) -> Self {
+    pub(super) fn begin(text: &'a mut String, name: &'static str, kind: Kind, what: &str) -> Self {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {}", kind.as_str());
         Self { text, name }
     }
 
     /// One sample. No label value needs escaping: names of maps hold neither quotes nor backslashes.
-    fn sample(&mut self, labels: &[(&str, &dyn Display)], value: impl Display) {
+    pub(super) fn sample(&mut self, labels: &[(&str, &dyn Display)], value: impl Display) {
         self.part("", labels, value);
     }
 
-    /// The classes of a histogram with this label, their sum and their number.
-    fn histogram(&mut self, label: (&str, &dyn Display), durations: &Durations) {
-        for (bound_s, count) in durations.at_most() {
-            self.part("_bucket", &[label, ("le", &bound_s)], count);
+    /// The classes of a histogram with these labels, their sum and their number.
+    pub(super) fn histogram(&mut self, labels: &[(&str, &dyn Display)], durations: &Durations) {
+        let bounds = durations.at_most().map(|(bound_s, count)| (bound_s.to_string(), count));
+        for (bound, count) in bounds.chain([("+Inf".to_owned(), durations.count())]) {
+            let class: Vec<(&str, &dyn Display)> =
+                labels.iter().copied().chain([("le", &bound as &dyn Display)]).collect();
+            self.part("_bucket", &class, count);
         }
-        self.part("_bucket", &[label, ("le", &"+Inf")], durations.count());
-        self.part("_sum", &[label], durations.sum().as_secs_f64());
-        self.part("_count", &[label], durations.count());
+        self.part("_sum", labels, durations.sum().as_secs_f64());
+        self.part("_count", labels, durations.count());
     }
 
     fn part(&mut self, suffix: &str, labels: &[(&str, &dyn Display)], value: impl Display) {
@@ -298,7 +300,7 @@ mod tests {
             durations.record(Duration::from_secs_f64(seconds));
         }
         let mut text = String::new();
-        Family::begin(&mut text, "m", Kind::Histogram, "What").histogram(("map", &"a"), &durations);
+        Family::begin(&mut text, "m", Kind::Histogram, "What").histogram(&[("map", &"a")], &durations);
         for line in [
             "# TYPE m histogram\n",
             "m_bucket{map=\"a\",le=\"0.001\"} 0\n",

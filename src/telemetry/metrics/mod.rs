@@ -4,4 +4,4 @@ mod recorder;
 #[cfg(test)]
 mod tests;
 
-pub use recorder::{InUse, Metrics, OpenConnection};
+pub use recorder::{InUse, Metrics, OpenConnection, ServiceReading};

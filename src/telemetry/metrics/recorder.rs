@@ -18,11 +18,12 @@ use crate::telemetry::families::{
 };
 use crate::telemetry::log::TelemetryError;
 use crate::telemetry::map_counters::{Family, MapCounters};
+use crate::telemetry::node::{NodeReading, write_node};
 use crate::telemetry::{exposition, families};
 use mrol_map::map::{MapName, RobotName};
 use mrol_service::{
-    End, Ended, JudgedScan, LaneUse, MapInfo, MapsAwake, Observer, Outcome, Readings, Reason, Shortage,
-    UnavailableMap,
+    End, Ended, JudgedScan, LaneUse, MapInfo, MapsAwake, Observer, Outcome, Readings, Reason, SharedMap,
+    Shortage, UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -59,6 +60,23 @@ pub struct InUse {
     pub bytes: usize,
 }
 
+/// What is known of the service at a scrape, for a caller who may name these maps.
+#[derive(Debug, Default)]
+pub struct ServiceReading {
+    /// Its lanes.
+    pub lanes: Vec<LaneUse>,
+    /// The maps whose counters are told.
+    pub names: Vec<MapName>,
+    /// Those that are open.
+    pub maps: Vec<MapInfo>,
+    /// How many are in memory.
+    pub awake: MapsAwake,
+    /// Those that could not be opened.
+    pub unavailable: Vec<UnavailableMap>,
+    /// Those that nodes of a cluster share.
+    pub shared: Vec<SharedMap>,
+}
+
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
 /// The recorder is the server's own and not the process's, so that several servers in one process (tests, a
@@ -74,6 +92,8 @@ struct Kept {
     keys: Mutex<BTreeSet<String>>,
     /// Robots whose scans are counted by name.
     robots: Mutex<BTreeSet<RobotName>>,
+    /// What a node of a cluster knew of it a moment ago; none of a server by itself.
+    node: Mutex<Option<NodeReading>>,
 }
 
 impl Metrics {
@@ -94,8 +114,13 @@ impl Metrics {
             .set_buckets_for_metric(overlap, &OVERLAP_BUCKETS)?
             .set_buckets_for_metric(alignment, &SECONDS_BUCKETS)?;
         let recorder = builder.build_recorder();
-        let kept =
-            Kept { recorder, maps: MapCounters::default(), keys: Mutex::default(), robots: Mutex::default() };
+        let kept = Kept {
+            recorder,
+            maps: MapCounters::default(),
+            keys: Mutex::default(),
+            robots: Mutex::default(),
+            node: Mutex::default(),
+        };
         let metrics = Self(Arc::new(kept));
         metrics.record(families::describe);
         metrics.record(|| {
@@ -222,22 +247,23 @@ impl Metrics {
         self.0.maps.keep(names);
     }
 
-    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `lanes`, `maps` and
-    /// those that are `unavailable` as they are now: a map that is gone leaves nothing behind.
-    pub fn render(
-        &self,
-        lanes: &[LaneUse],
-        names: &[MapName],
-        maps: &[MapInfo],
-        awake: MapsAwake,
-        unavailable: &[UnavailableMap],
-    ) -> String {
+    /// Notes what a node of a cluster knows of it.
+    pub fn node(&self, reading: NodeReading) {
+        *self.0.node.lock() = Some(reading);
+    }
+
+    /// Everything in Prometheus' text form, with what is known of the service now: a map that is gone leaves nothing
+    /// behind.
+    pub fn render(&self, service: &ServiceReading) -> String {
         let mut text = self.0.recorder.handle().render();
-        exposition::write_counters(&mut text, &self.0.maps.of(names));
-        exposition::write_lanes(&mut text, lanes);
-        exposition::write_maps(&mut text, maps);
-        exposition::write_awake(&mut text, awake);
-        exposition::write_unavailable(&mut text, unavailable);
+        exposition::write_counters(&mut text, &self.0.maps.of(&service.names));
+        exposition::write_lanes(&mut text, &service.lanes);
+        exposition::write_maps(&mut text, &service.maps);
+        exposition::write_awake(&mut text, service.awake);
+        exposition::write_unavailable(&mut text, &service.unavailable);
+        if let Some(node) = &*self.0.node.lock() {
+            write_node(&mut text, node, &service.shared);
+        }
         text
     }
 

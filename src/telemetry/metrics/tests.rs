@@ -1,10 +1,11 @@
 //! What is counted, and what of it a scrape gets.
 
 use super::recorder::*;
+use crate::telemetry::NodeReading;
 use mrol_map::align::Verdict;
 use mrol_map::map::Lookup;
 use mrol_map::map::{MapName, RobotName, SessionName};
-use mrol_service::{Change, End, Ended, JudgedScan, MapsAwake, Observer, Outcome};
+use mrol_service::{Change, End, Ended, JudgedScan, Observer, Outcome};
 use std::time::Duration;
 
 /// A scan that was judged.
@@ -25,6 +26,11 @@ fn judged(robot: &str, verdict: Verdict) -> JudgedScan {
     }
 }
 
+/// What is known of a service that has these maps, none of which is open.
+fn of(names: &[MapName]) -> ServiceReading {
+    ServiceReading { names: names.to_vec(), ..ServiceReading::default() }
+}
+
 /// Tells `metrics` that something was done to `map`.
 fn tell(metrics: &Metrics, map: &MapName, outcome: Outcome) {
     let end = End::Done(outcome);
@@ -39,7 +45,7 @@ fn what_was_counted_is_rendered_with_its_description() {
     tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 7 });
     tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 5 });
     metrics.scan(&map, &judged("r", Verdict::LowOverlap));
-    let text = metrics.render(&[], &[map], &[], MapsAwake::default(), &[]);
+    let text = metrics.render(&of(&[map]));
     for line in [
         r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
         r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
@@ -69,10 +75,10 @@ fn a_map_that_is_gone_leaves_no_series() {
         tell(&metrics, map, Outcome::Changed(undone));
     }
     let names = std::slice::from_ref(&kept);
-    let text = metrics.render(&[], names, &[], MapsAwake::default(), &[]);
+    let text = metrics.render(&of(names));
     assert!(text.contains(r#"map="kept""#) && !text.contains("gone"), "{text}");
     metrics.keep_maps(names);
-    assert!(!metrics.render(&[], &[kept, gone], &[], MapsAwake::default(), &[]).contains("gone"));
+    assert!(!metrics.render(&of(&[kept, gone])).contains("gone"));
 }
 
 #[test]
@@ -82,7 +88,7 @@ fn keys_have_so_many_series_and_no_more() {
         metrics.key_used("http", &format!("key-{key}"));
     }
     metrics.key_used("http", "key-0");
-    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
+    let text = metrics.render(&ServiceReading::default());
     assert_eq!(text.matches("mrol_key_requests_total{").count(), KEY_SERIES_MAX + 1);
     assert!(text.contains(r#"key="(others)"} 2"#) && text.contains(r#"key="key-0"} 2"#));
 }
@@ -95,7 +101,7 @@ fn robots_beyond_the_bound_are_counted_together() {
     };
     (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
     scan(0);
-    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
+    let text = metrics.render(&ServiceReading::default());
     assert_eq!(text.matches("mrol_robot_scans_total{").count(), Metrics::ROBOTS_MAX + 1);
     for line in [
         r#"{robot="r0",verdict="accepted"} 2"#,
@@ -112,12 +118,10 @@ fn a_connection_is_open_until_it_is_dropped() {
     let open = metrics.connection_opened("http");
     metrics.connection_refused("http");
     assert!(
-        metrics
-            .render(&[], &[], &[], MapsAwake::default(), &[])
-            .contains(r#"mrol_connections_open{listener="http"} 1"#)
+        metrics.render(&ServiceReading::default()).contains(r#"mrol_connections_open{listener="http"} 1"#)
     );
     drop(open);
-    let text = metrics.render(&[], &[], &[], MapsAwake::default(), &[]);
+    let text = metrics.render(&ServiceReading::default());
     for line in ["open", "accepted_total", "refused_total"]
         .map(|name| format!("mrol_connections_{name}{{listener=\"http\"}}"))
     {
@@ -130,5 +134,17 @@ fn a_connection_is_open_until_it_is_dropped() {
 fn two_servers_count_apart() {
     let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
     one.request("http", "GetMap", "200", Duration::ZERO);
-    assert!(!other.render(&[], &[], &[], MapsAwake::default(), &[]).contains("GetMap"));
+    assert!(!other.render(&ServiceReading::default()).contains("GetMap"));
+}
+
+#[test]
+fn a_server_by_itself_says_nothing_of_a_cluster() {
+    let metrics = Metrics::new().unwrap();
+    assert!(!metrics.render(&ServiceReading::default()).contains("mrol_node_"));
+    metrics.node(NodeReading { live: 3, ..NodeReading::default() });
+    let text = metrics.render(&ServiceReading::default());
+    assert!(
+        text.contains("mrol_node_joined 0") && text.contains(r#"mrol_cluster_nodes{state="live"} 3"#),
+        "{text}"
+    );
 }

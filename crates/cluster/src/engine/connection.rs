@@ -3,9 +3,11 @@
 use std::fmt;
 use std::future::Future;
 use std::sync::Arc;
+use std::time::Duration;
 
 use async_nats::Client;
 use async_nats::connection::State;
+use mrol_map::util::{Durations, SharedDurations};
 use tokio::runtime::{Handle, Runtime};
 use tokio::task::JoinHandle;
 
@@ -22,6 +24,7 @@ struct Connection {
     client: Client,
     replicas: usize,
     servers: String,
+    acknowledgments: SharedDurations,
     handle: Handle,
     /// Taken at the end, which does not wait for what still runs.
     runtime: Option<Runtime>,
@@ -31,8 +34,9 @@ impl Engine {
     /// Of a runtime that has a connection.
     pub(super) fn of(client: Client, settings: &EngineSettings, runtime: Runtime) -> Self {
         let (replicas, servers) = (settings.replicas, settings.servers());
-        let handle = runtime.handle().clone();
-        Self(Arc::new(Connection { client, replicas, servers, handle, runtime: Some(runtime) }))
+        let (acknowledgments, handle) = (SharedDurations::default(), runtime.handle().clone());
+        let runtime = Some(runtime);
+        Self(Arc::new(Connection { client, replicas, servers, acknowledgments, handle, runtime }))
     }
 
     /// True while a server is connected.
@@ -43,6 +47,16 @@ impl Engine {
     /// The addresses that were given, without passwords.
     pub fn servers(&self) -> &str {
         &self.0.servers
+    }
+
+    /// How long messages of the maps' logs took until NATS acknowledged them.
+    pub fn acknowledgments(&self) -> Durations {
+        self.0.acknowledgments.read()
+    }
+
+    /// Notes how long a message of a log took.
+    pub(crate) fn note_acknowledgment(&self, took: Duration) {
+        self.0.acknowledgments.record(took);
     }
 
     /// Waits for what needs the connection. Not for an async thread, on which it panics.

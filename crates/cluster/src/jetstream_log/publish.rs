@@ -1,6 +1,6 @@
 //! Publishing: by compare-and-set on the number and the id of the last message.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use async_nats::HeaderMap;
 use bytes::Bytes;
@@ -45,10 +45,14 @@ pub(super) async fn publish(
     };
     let mut headers = headers_of(message);
     expect(&mut headers, names, position);
+    let begun = Instant::now();
     let answer = engine.request(&names.subject(message.id), headers, payload, ATTEMPT_MAX).await;
     let answer = answer.map_err(|error| NotPublished::Unknown(error.to_string()))?;
     match read_answer::<Acknowledgment>(&answer.payload) {
-        Ok(acknowledged) => at(acknowledged.seq, names, message, position),
+        Ok(acknowledged) => {
+            engine.note_acknowledgment(begun.elapsed());
+            at(acknowledged.seq, names, message, position)
+        }
         Err(CallError::Api(error)) if error.is_wrong_last_sequence() || error.is_id_in_process() => {
             let settled = settle(engine, names, message, position, &error);
             let late = |_| Err(NotPublished::Unknown(format!("{error}; and what is there was not answered")));

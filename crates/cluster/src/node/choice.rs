@@ -121,7 +121,8 @@ mod tests {
             };
             (node(name), Seen { beat, is_live })
         };
-        View { beats: 10, others: others.iter().map(seen).collect::<BTreeMap<_, _>>() }
+        let others = others.iter().map(seen).collect::<BTreeMap<_, _>>();
+        View { beats: 10, others, ..View::default() }
     }
 
     fn led_by(leader: Option<&str>, is_here: bool) -> Lead {

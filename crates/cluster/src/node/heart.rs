@@ -85,7 +85,8 @@ impl Heart {
             let is_live = !liveness.is_gone(&node);
             (node, Seen { beat, is_live })
         };
-        let now = View { beats: *beats, others: others.into_iter().map(seen).collect() };
+        let others = others.into_iter().map(seen).collect();
+        let now = View { beats: *beats, seen: Some(Instant::now()), others };
         let is_behind = is_behind(&own, &self.view.borrow());
         let mut since = self.behind_since.lock();
         *since = is_behind.then(|| since.unwrap_or_else(Instant::now));
@@ -114,11 +115,9 @@ fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
 
 /// True where a copy is behind where another node was a beat ago, or is not there.
 fn is_behind(own: &Beat, before: &View) -> bool {
-    let live = before.others.values().filter(|seen| seen.is_live);
-    let heads = live.flat_map(|seen| &seen.beat.maps).filter(|(_, head)| !head.is_parted);
     let is_reached =
         |map: &Uuid, revision: u64| own.maps.get(map).is_some_and(|own| own.revision >= revision);
-    heads.into_iter().any(|(map, head)| !is_reached(map, head.revision))
+    before.furthest().iter().any(|(map, revision)| !is_reached(map, *revision))
 }
 
 /// Tells the log which nodes have come and gone.

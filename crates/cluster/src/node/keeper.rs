@@ -1,6 +1,7 @@
 //! Keeps this node's copy of one map.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -32,6 +33,8 @@ pub(super) struct Keeper {
     /// The node that is to lead the map whenever it can.
     pub(super) wished: watch::Receiver<Option<NodeName>>,
     pub(super) view: watch::Receiver<View>,
+    /// How often this node took a map over.
+    pub(super) takeovers: Arc<AtomicU64>,
 }
 
 impl Keeper {
@@ -166,7 +169,11 @@ impl Keeper {
             Choice::Stay => return,
             Choice::Claim => {
                 let live = view.holders(self.uuid).map(|(node, head)| (node.clone(), head.revision));
-                self.service.lead_map(&self.name, live.collect()).await
+                let led = self.service.lead_map(&self.name, live.collect()).await;
+                if led.is_ok() {
+                    self.takeovers.fetch_add(1, Ordering::Relaxed);
+                }
+                led
             }
             Choice::HandOver(node) => {
                 tracing::info!(map = %self.name, %node, "hands over");

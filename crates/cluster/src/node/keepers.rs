@@ -1,6 +1,8 @@
 //! One keeper for each map of the cluster's list.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 use std::time::{Duration, Instant};
 
 use mrol_map::map::MapName;
@@ -44,6 +46,8 @@ pub(super) struct Keepers {
     service: MapService,
     joined: Joined,
     view: watch::Receiver<View>,
+    /// How often this node took a map over.
+    takeovers: Arc<AtomicU64>,
     kept: BTreeMap<MapName, Kept>,
     /// Revision of the list that was followed last.
     revision: u64,
@@ -69,10 +73,11 @@ impl Keepers {
         service: MapService,
         joined: Joined,
         view: watch::Receiver<View>,
+        takeovers: Arc<AtomicU64>,
     ) -> Self {
         let (node, record_version) = (settings.name.clone(), settings.record_version);
         let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
-        Self { node, record_version, service, joined, view, kept, revision: 0, deleted }
+        Self { node, record_version, service, joined, view, takeovers, kept, revision: 0, deleted }
     }
 
     /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
@@ -167,6 +172,7 @@ impl Keepers {
             uuid,
             wished: heard,
             view: self.view.clone(),
+            takeovers: Arc::clone(&self.takeovers),
         };
         Kept { uuid, wished, task: tokio::spawn(keeper.keep()) }
     }

@@ -2,16 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc as std_mpsc;
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use mrol_map::util::Durations;
 use mrol_service::replication::NodeName;
 use mrol_service::{Cluster, Forward, Lead, MapService};
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio::task;
+use uuid::Uuid;
 
 use super::entering::Entering;
 use super::heart::Heart;
@@ -34,6 +37,7 @@ pub struct Node {
     view: watch::Sender<View>,
     /// Since when a copy is behind those of others, or not there.
     behind_since: Arc<Mutex<Option<Instant>>>,
+    takeovers: Arc<AtomicU64>,
     wishes: mpsc::UnboundedSender<Wish>,
     heard: Mutex<Option<mpsc::UnboundedReceiver<Wish>>>,
     work: Mutex<Option<task::JoinHandle<()>>>,
@@ -49,6 +53,14 @@ pub struct NodeStatus {
     pub grpc: BTreeMap<NodeName, String>,
     /// The nodes that are gone.
     pub gone: Vec<NodeName>,
+    /// How long ago NATS acknowledged the last beat of this node and gave those of the others; none before the first.
+    pub seen: Option<Duration>,
+    /// The furthest revision of each map at the other nodes that are live and take changes of it.
+    pub furthest: BTreeMap<Uuid, u64>,
+    /// How often this node took a map over.
+    pub takeovers: u64,
+    /// How long its messages to the maps' logs took until NATS acknowledged them.
+    pub acknowledgments: Durations,
 }
 
 impl Node {
@@ -64,6 +76,7 @@ impl Node {
             joined: Arc::default(),
             view: watch::Sender::new(View::default()),
             behind_since: Arc::default(),
+            takeovers: Arc::default(),
             wishes,
             heard: Mutex::new(Some(heard)),
             work: Mutex::new(None),
@@ -105,7 +118,8 @@ impl Node {
                 return tracing::error!(%error, "no thread for the node's beats: it takes no part in the cluster");
             }
         }
-        let keepers = Keepers::new(&self.settings, service, joined, self.view.subscribe());
+        let (view, takeovers) = (self.view.subscribe(), Arc::clone(&self.takeovers));
+        let keepers = Keepers::new(&self.settings, service, joined, view, takeovers);
         keepers.keep(heard).await;
     }
 
@@ -140,6 +154,14 @@ impl Node {
             is_joined: view.beats > 0,
             grpc: others.clone().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone())).collect(),
             gone: others.filter(|(_, seen)| !seen.is_live).map(|(node, _)| node.clone()).collect(),
+            seen: view.seen.map(|seen| seen.elapsed()),
+            furthest: view.furthest(),
+            takeovers: self.takeovers.load(Ordering::Relaxed),
+            acknowledgments: self
+                .joined
+                .get()
+                .map(|joined| joined.engine.acknowledgments())
+                .unwrap_or_default(),
         }
     }
 

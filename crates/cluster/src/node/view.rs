@@ -1,6 +1,7 @@
 //! What a node sees of the others.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use mrol_service::replication::NodeName;
 use uuid::Uuid;
@@ -12,6 +13,8 @@ use crate::beat::{Beat, MapHead};
 pub(super) struct View {
     /// Own beats that were acknowledged.
     pub(super) beats: u64,
+    /// When the last of them was.
+    pub(super) seen: Option<Instant>,
     /// The other nodes, those that are gone among them.
     pub(super) others: BTreeMap<NodeName, Seen>,
 }
@@ -38,6 +41,18 @@ impl View {
     pub(super) fn reads_least(&self) -> u32 {
         let live = self.others.values().filter(|seen| seen.is_live);
         live.map(|seen| seen.beat.record_version).min().unwrap_or(u32::MAX)
+    }
+
+    /// The furthest revision of each map at the others that are live and take changes of it.
+    pub(super) fn furthest(&self) -> BTreeMap<Uuid, u64> {
+        let live = self.others.values().filter(|seen| seen.is_live);
+        let heads = live.flat_map(|seen| &seen.beat.maps).filter(|(_, head)| !head.is_parted);
+        let mut furthest = BTreeMap::new();
+        for (map, head) in heads {
+            let revision = furthest.entry(*map).or_insert(head.revision);
+            *revision = head.revision.max(*revision);
+        }
+        furthest
     }
 
     /// True of another node that is live.

@@ -29,6 +29,8 @@ pub struct SharedMap {
     pub lead: Lead,
     /// Why it takes no changes here any more.
     pub failure: Option<String>,
+    /// True where that is another history than the log has, and not a disk that failed.
+    pub has_diverged: bool,
 }
 
 impl MapService {
@@ -39,6 +41,7 @@ impl MapService {
             version: map.version_now(),
             lead: map.lead(),
             failure: map.failure().map(str::to_owned),
+            has_diverged: map.has_diverged(),
         };
         let maps = self.inner.catalog.within(&self.allowed_maps).into_iter();
         let mut shared: Vec<_> = maps.map(describe).filter(|map| map.lead != Lead::Alone).collect();

@@ -282,6 +282,11 @@ impl HostedMap {
         }
     }
 
+    /// True where it takes no changes since this node has another history of it than the log of several nodes.
+    pub(crate) fn has_diverged(&self) -> bool {
+        matches!(self.commit_queue.stopped(), Some(Stop::Diverged(_)))
+    }
+
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
     pub(crate) fn unreadable(&self, error: &StoreError) -> ServiceError {
         match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
