@@ -101,7 +101,8 @@ impl Load {
 }
 
 impl Reads {
-    /// Questions that failed while the node was said to be up, how many were answered, and the 99th percentile of how long those took.
+    /// Questions that failed while the node was said to be up, how many were answered, and the 99th percentile of how
+    /// long those took.
     pub(crate) fn summary(&self) -> (u64, usize, Duration) {
         let mut took = self.took.lock().unwrap().clone();
         took.sort();

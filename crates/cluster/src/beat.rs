@@ -36,7 +36,8 @@ pub struct MapHead {
     /// True where the node makes the map's changes.
     #[serde(default)]
     pub leads: bool,
-    /// True where the node takes no changes of the map any more: it has another history than the log, or its disk failed.
+    /// True where the node takes no changes of the map any more: it has another history than the log, or its disk
+    /// failed.
     #[serde(default)]
     pub is_parted: bool,
 }

@@ -10,7 +10,8 @@
 //! 6. `following`: what makes a node's copy of a map follow its log.
 //! 7. `forwarder`: what takes changes on to the node that leads.
 //! 8. `catalog`: the list of maps that all nodes share.
-//! 9. `node`: a node of the cluster, which beats, keeps its copies of the maps and takes over those whose leader is gone.
+//! 9. `node`: a node of the cluster, which beats, keeps its copies of the maps and takes over those whose leader is
+//!    gone.
 
 mod bases;
 mod beat;

@@ -29,8 +29,8 @@ const TRIED_FOR: Duration = Duration::from_secs(5);
 const PAUSE_MIN: Duration = Duration::from_millis(50);
 const PAUSE_MAX: Duration = Duration::from_millis(200);
 
-/// How long after it has lost the lead a node that was asked is waited for: one that handed it over answers, and one that
-/// was stopped does not.
+/// How long after it has lost the lead a node that was asked is waited for: one that handed it over answers, and one
+/// that was stopped does not.
 const ANSWERED_WITHIN: Duration = Duration::from_millis(500);
 
 /// Where an operation of which the leader makes the changes is made.

@@ -94,8 +94,8 @@ impl Catalog {
         })
     }
 
-    /// Takes a map out for good; false where there is none of that name. `uuid` is the map that was meant: where another
-    /// has its name by now, nothing is done.
+    /// Takes a map out for good; false where there is none of that name. `uuid` is the map that was meant: where
+    /// another has its name by now, nothing is done.
     ///
     /// # Errors
     /// Says whether it may be deleted.

@@ -6,8 +6,8 @@ use tokio_stream::StreamExt;
 
 use crate::engine::Engine;
 
-/// Wakes whoever follows the list, a moment after it was changed. A hint: some may be lost while NATS is not reached, so
-/// whoever follows also looks now and then.
+/// Wakes whoever follows the list, a moment after it was changed. A hint: some may be lost while NATS is not reached,
+/// so whoever follows also looks now and then.
 #[derive(Debug)]
 pub struct Hints {
     heard: watch::Receiver<u64>,

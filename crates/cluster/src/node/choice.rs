@@ -44,8 +44,8 @@ pub(super) struct Known<'a> {
     pub(super) record_version: u32,
 }
 
-/// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart by
-/// the log. It is made so that one claims as a rule, and soon.
+/// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart
+/// by the log. It is made so that one claims as a rule, and soon.
 pub(super) fn choose(known: &Known<'_>) -> Choice {
     match known.lead {
         Lead::Shared { is_here: true, .. } => {

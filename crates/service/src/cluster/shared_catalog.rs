@@ -30,8 +30,8 @@ pub trait SharedCatalog: Debug + Send + Sync {
     /// `NoQuorum` where nobody acknowledges it: nothing was entered. `OutcomeUnknown` where that is not known.
     fn enter<'a>(&'a self, name: &'a MapName, new: NewMap) -> Later<'a, Result<bool, ServiceError>>;
 
-    /// True where a map that this node has no copy of is listed, and it has one now: another node has just made it. Asks
-    /// NATS a few times a second at most, however many ask.
+    /// True where a map that this node has no copy of is listed, and it has one now: another node has just made it.
+    /// Asks NATS a few times a second at most, however many ask.
     fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, bool>;
 
     /// Takes a map out, for good: it is deleted on all nodes.

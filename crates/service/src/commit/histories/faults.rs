@@ -369,8 +369,8 @@ fn a_node_that_could_compare_nothing_gives_no_base() {
     assert!(base.is_none(), "a base of a history that is not the log's");
 }
 
-/// Seen with real nodes: a scan waited for its turn at a node that lost the lead and took it over again; meanwhile it had
-/// been sent again to another, and was made by that. Its id is looked for again.
+/// Seen with real nodes: a scan waited for its turn at a node that lost the lead and took it over again; meanwhile it
+/// had been sent again to another, and was made by that. Its id is looked for again.
 #[test]
 fn a_change_that_was_decided_on_before_another_node_made_changes_is_decided_on_again() {
     let mut history = begun();
