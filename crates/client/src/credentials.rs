@@ -26,14 +26,16 @@ pub struct Credentials {
 #[derive(Clone, Default)]
 pub(super) struct Shown {
     key: Option<MetadataValue<Ascii>>,
-    /// What a node adds that forwards the calls of its own callers.
+    /// Of calls that a node forwards.
     forwarded: Option<Arc<Forwarded>>,
 }
 
-/// Whose calls are forwarded, and by whom.
+/// What a node says of a call that it forwards.
 #[derive(Debug)]
 struct Forwarded {
+    /// The node.
     node: Option<MetadataValue<Ascii>>,
+    /// Its caller.
     caller: Option<MetadataValue<Ascii>>,
 }
 
@@ -107,12 +109,15 @@ impl Shown {
 
 impl Interceptor for Shown {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
-        let Self { key, forwarded } = self;
-        let of_node = forwarded.as_deref().map(|Forwarded { node, caller }| [(NODE, node), (CALLER, caller)]);
-        for (name, value) in of_node.into_iter().flatten().chain([("authorization", &*key)]) {
+        let mut show = |name, value: &Option<MetadataValue<Ascii>>| {
             if let Some(value) = value {
                 request.metadata_mut().insert(name, value.clone());
             }
+        };
+        show("authorization", &self.key);
+        if let Some(Forwarded { node, caller }) = self.forwarded.as_deref() {
+            show(NODE, node);
+            show(CALLER, caller);
         }
         Ok(request)
     }

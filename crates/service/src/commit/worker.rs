@@ -137,7 +137,10 @@ impl Worker {
                 }
                 Submission::Shared(act) => {
                     self.commit_group(&mut group);
-                    drop(answer.send(self.act(act)));
+                    let done = self.act(act);
+                    // Told before, so that whoever hears of it finds who leads by then.
+                    self.tell_lead();
+                    drop(answer.send(done));
                 }
             }
         }
