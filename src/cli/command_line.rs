@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+#[cfg(feature = "cluster")]
+use super::cluster;
 #[cfg(feature = "logs")]
 use super::log;
 use super::{
@@ -67,6 +69,8 @@ enum Command {
     Keepout(keepout::KeepOuts),
     Watch(watch::Watch),
     Maps(maps::Maps),
+    #[cfg(feature = "cluster")]
+    Cluster(cluster::Cluster),
     Health(health::Health),
     Key(key::Keys),
     Snapshot(snapshot::TakeSnapshots),
@@ -121,6 +125,8 @@ impl Command {
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Keepout(keepout) => runtime::block_on(keepout.run(output)),
             Self::Watch(watch) => runtime::block_on(watch.run(output)),
+            #[cfg(feature = "cluster")]
+            Self::Cluster(cluster) => cluster.run(output),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
             Self::Health(health) => runtime::block_on(health.run(output)),
             Self::Key(key) => key.run(&output),
@@ -170,9 +176,14 @@ mod tests {
             .collect()
     }
 
+    /// The commands of a command, and theirs.
+    fn with_inner(command: &clap::Command) -> Vec<&clap::Command> {
+        command.get_subcommands().flat_map(|command| [vec![command], with_inner(command)].concat()).collect()
+    }
+
     #[test]
     fn every_example_is_a_command_line() {
-        for command in CommandLine::command().get_subcommands() {
+        for command in with_inner(&CommandLine::command()) {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let examples =
                 help.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| line.contains("mrol "));

@@ -2,11 +2,11 @@
 
 use std::fmt;
 use std::fmt::Display;
-use std::io::{self, BufRead, IsTerminal, Write};
 
 use clap::Subcommand;
 use serde::Serialize;
 
+use super::confirmation::confirm_deletion;
 use super::remote::ServerOptions;
 use mrol::console::CliError;
 use mrol::console::MapReport;
@@ -151,42 +151,14 @@ impl Maps {
                 output.print(&Renamed { renamed: name.to_string(), map: MapReport::from(&info) })
             }
             Action::Delete { map, yes } => {
-                let (input, questions) = (io::stdin(), io::stderr());
-                if !yes && input.is_terminal() {
-                    if !questions.is_terminal() {
-                        return Err(CliError::usage(format!(
-                            "map {} is not deleted: its name is asked for on standard error, which is no terminal; --yes \
-                             deletes it without",
-                            map.name
-                        )));
-                    }
-                    confirm_deletion(&map.name, input.lock(), questions)?;
+                if !yes {
+                    let warning = format!("Map {} goes for good, memory and files.", map.name);
+                    confirm_deletion(&map.name, &warning)?;
                 }
                 map.server.connect().await?.delete_map(&map.name).await?;
                 output.print(&Deleted { deleted: map.name.to_string() })
             }
         }
-    }
-}
-
-/// Asks for the name of the map that is to be deleted.
-fn confirm_deletion(
-    map: &MapName,
-    mut answers: impl BufRead,
-    mut questions: impl Write,
-) -> Result<(), CliError> {
-    let mut answer = String::new();
-    let asked = write!(questions, "Map {map} goes for good, memory and files. Its name, to delete it: ")
-        .and_then(|()| questions.flush())
-        .and_then(|()| answers.read_line(&mut answer));
-    match asked {
-        Ok(_) if answer.trim() == map.as_str() => Ok(()),
-        Ok(_) => Err(CliError::failed(format!(
-            "map {map} is not deleted: its name was not given; --yes deletes it without"
-        ))),
-        Err(error) => Err(CliError::failed(format!(
-            "map {map} is not deleted: {error}; --yes deletes it without asking"
-        ))),
     }
 }
 
@@ -266,26 +238,5 @@ struct Deleted {
 impl Display for Deleted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "map {} deleted", self.deleted)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_map_is_deleted_by_its_name_alone() {
-        let map = MapName::new("office").unwrap();
-        let said = |answer: &str| {
-            let mut questions = Vec::new();
-            let confirmed = confirm_deletion(&map, answer.as_bytes(), &mut questions);
-            assert!(String::from_utf8(questions).unwrap().starts_with("Map office goes for good"));
-            confirmed.map_err(|error| error.to_string())
-        };
-        assert_eq!((said("office\n"), said(" office ")), (Ok(()), Ok(())));
-        for other in ["", "\n", "y\n", "office2\n"] {
-            let refused = said(other).unwrap_err();
-            assert!(refused.starts_with("map office is not deleted: its name was not given"), "{refused}");
-        }
     }
 }

@@ -8,9 +8,12 @@ mod alignment_options;
 mod block;
 mod check;
 mod classify;
+#[cfg(feature = "cluster")]
+mod cluster;
 mod command_line;
 mod completions;
 mod config;
+mod confirmation;
 mod delete;
 mod doctor;
 mod events;

@@ -12,6 +12,7 @@ use mrol_map::map::{KeepOutName, MapName, Region, RequestId, RobotName, SessionN
 use mrol_map::mapping::SENSOR_HEIGHT_MAX_M;
 use mrol_map::planning::{GridArea, Sphere};
 use mrol_map::util::Keyword;
+use mrol_service::replication::NodeName;
 
 /// A parser for keywords; `--help` lists them.
 pub fn keyword<T: Keyword>() -> impl TypedValueParser<Value = T> {
@@ -154,6 +155,11 @@ pub fn keep_out_name(text: &str) -> Result<KeepOutName, String> {
 /// Parses the name of a map.
 pub fn map_name(text: &str) -> Result<MapName, String> {
     MapName::new(text).map_err(|error| error.to_string())
+}
+
+/// Parses the name of a node of a cluster.
+pub fn node_name(text: &str) -> Result<NodeName, String> {
+    NodeName::new(text).map_err(|error| error.to_string())
 }
 
 /// Parses the name of a robot.

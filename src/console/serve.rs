@@ -4,7 +4,10 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::pin::pin;
 
+use mrol_service::ServiceSettings;
+use mrol_store::{DataDir, LeftMap};
 use serde_json::json;
+use tokio::task::spawn_blocking;
 
 use crate::config::{Config, ConfigError, unknown_variables};
 use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
@@ -28,6 +31,7 @@ EXAMPLES:
   mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
   mrol serve --cluster nats://10.0.0.1:4222,nats://10.0.0.2:4222 --node n1 --http-listen 10.0.0.1:7333 \\
       --grpc-listen 10.0.0.1:7334                share the maps with other nodes (docs/guide/cluster.md)
+  mrol serve --leave-cluster                     take this data folder out of its cluster for good, and serve it alone
   MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable: limits.maps_max, with two underscores
 
 The first line on standard output has the addresses; the log goes to standard error. Settings come from defaults,
@@ -44,6 +48,10 @@ takes the changes of the last interval.";
 pub struct Serve {
     #[command(flatten)]
     options: ServeOptions,
+    /// Take the data folder out of its cluster for good, then serve it alone: every map gets a new uuid, and undo does
+    /// not reach behind. Not with --cluster
+    #[arg(long)]
+    leave_cluster: bool,
 }
 
 /// Options that override settings of the daemon.
@@ -124,6 +132,10 @@ impl Serve {
     /// When settings are wrong, or the server cannot start or ends by an error.
     pub async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
+        if self.leave_cluster && config.cluster.is_used() {
+            let (one, other) = ("--leave-cluster", "cluster.nats (--cluster)");
+            return Err(CliError::usage(ConfigError::Contradiction { one, other }));
+        }
         let _logging =
             start_logging(config.log.format, &config.log.level, config.log.audit).map_err(CliError::usage)?;
         for variable in unknown_variables() {
@@ -133,6 +145,12 @@ impl Serve {
             tracing::warn!(constant, "is a constant, and what is set of it does not count");
         }
         let (hangups, mut shutdown) = (Hangups::hear(), pin!(shutdown_signal()));
+        let begun = async {
+            if self.leave_cluster {
+                leave_cluster(&config).await?;
+            }
+            Ok::<_, CliError>(Server::bind(config).await?)
+        };
         // Signals are handled from here on. The thread that opens maps is then abandoned at any point: nothing was
         // acknowledged, and files are written as a whole or not at all.
         let server = tokio::select! {
@@ -141,7 +159,7 @@ impl Serve {
                 tracing::info!("told to end while the maps are being opened: ends, nothing is lost");
                 return Ok(());
             }
-            server = Server::bind(config) => server?,
+            server = begun => server?,
         };
         tokio::spawn(hangups.reload(server.files()));
         match output.print(&Serving::of(&server)) {
@@ -157,6 +175,33 @@ impl Serve {
         };
         Ok(server.run(shutdown).await?)
     }
+}
+
+/// Takes the data folder out of its cluster. Ended at any moment, it is to be done again, and nothing is lost.
+async fn leave_cluster(config: &Config) -> Result<(), CliError> {
+    let ServiceSettings { data_dir, store, .. } = config.service_settings();
+    let Some(data_dir) = data_dir else {
+        return Err(CliError::usage("--leave-cluster is of no use without a data folder (data_dir is \"\")"));
+    };
+    let leave = move || {
+        DataDir::open(&data_dir, store)?.leave_cluster(|LeftMap { name, revision, before, now }| {
+            tracing::info!(map = %name, revision, %before, %now, "has a uuid of its own now");
+        })
+    };
+    let left = spawn_blocking(leave).await.map_err(CliError::failed)?;
+    match left {
+        Ok(Some(node)) => {
+            tracing::info!(node, "the data folder has left the cluster: this server is by itself")
+        }
+        Ok(None) => tracing::info!("the data folder belongs to no node of a cluster: nothing is to be done"),
+        Err(error) => {
+            let message = format!(
+                "the data folder still belongs to the cluster: {error}; once that is put right, start with --leave-cluster again"
+            );
+            return Err(CliError::failed(message));
+        }
+    }
+    Ok(())
 }
 
 impl ServeOptions {

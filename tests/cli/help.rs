@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 33] = [
+const COMMANDS: [&str; 34] = [
     "serve",
     "demo",
     "map",
@@ -23,6 +23,7 @@ const COMMANDS: [&str; 33] = [
     "undo",
     "keepout",
     "maps",
+    "cluster",
     "bench",
     "experiment",
     "health",

@@ -2,6 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod broken_connections;
+#[cfg(feature = "cluster")]
+mod cluster;
 mod demo;
 mod depth_images;
 mod doctor;

@@ -97,6 +97,14 @@ impl Bucket {
         self.read_matching(key).map(|mut entries| entries.pop())
     }
 
+    /// The revision of a key's last change, its deletion too; 0 where there was none. From one of the servers.
+    ///
+    /// # Errors
+    /// Nobody answered.
+    pub fn last_revision(&self, key: &str) -> Result<u64, BucketError> {
+        Ok(self.messages_of(key)?.last().map_or(0, |message| message.sequence))
+    }
+
     /// Reads all keys from one of the servers, which may lag behind the others.
     ///
     /// # Errors
@@ -106,6 +114,12 @@ impl Bucket {
     }
 
     fn read_matching(&self, keys: &str) -> Result<Vec<BucketEntry>, BucketError> {
+        let found = self.messages_of(keys)?;
+        Ok(found.into_iter().filter_map(|message| self.entry_of(message)).collect())
+    }
+
+    /// The last message of each key, deletions among them.
+    fn messages_of(&self, keys: &str) -> Result<Vec<BatchMessage>, BucketError> {
         #[derive(Serialize)]
         struct Question {
             multi_last: [String; 1],
@@ -113,8 +127,7 @@ impl Bucket {
         }
         let question = Question { multi_last: [self.subject(keys)], batch: KEYS_MAX };
         let found = self.engine.block_on(self.engine.batch(&self.stream(), &question, WITHIN));
-        let found = found.map_err(|error| self.unavailable(&error))?;
-        Ok(found.into_iter().filter_map(|message| self.entry_of(message)).collect())
+        found.map_err(|error| self.unavailable(&error))
     }
 
     fn publish(&self, key: &str, value: Bytes, headers: HeaderMap) -> Result<u64, BucketError> {

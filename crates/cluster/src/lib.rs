@@ -10,8 +10,10 @@
 //! 6. `following`: what makes a node's copy of a map follow its log.
 //! 7. `forwarder`: what takes changes on to the node that leads.
 //! 8. `catalog`: the list of maps that all nodes share.
-//! 9. `node`: a node of the cluster, which beats, keeps its copies of the maps and takes over those whose leader is
-//!    gone.
+//! 9. `store`: all of these at NATS, as one thing; maps are entered there.
+//! 10. `overview`: the cluster as it is seen by whoever is no node of it.
+//! 11. `node`: a node of the cluster, which beats, keeps its copies of the maps and takes over those whose leader is
+//!     gone.
 
 mod bases;
 mod beat;
@@ -24,15 +26,21 @@ mod forwarder;
 mod jetstream_log;
 mod liveness;
 mod node;
+mod overview;
+mod store;
 
 pub use bases::{BaseError, BasePointers, BaseStore, Orphans};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
 pub use catalog::{Catalog, CatalogError, Hints, Listing, MapEntry};
-pub use engine::{ConnectError, Credentials, Engine, EngineSettings, StreamError, StreamState};
+pub use engine::{
+    ConnectError, Credentials, Engine, EngineSettings, StreamError, StreamServers, StreamState,
+};
 pub use following::Following;
 pub use forwarder::{Forwarder, ForwarderError, ForwarderSettings, NodeCertificate};
 pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
 pub use liveness::Liveness;
 pub use node::{Node, NodeSettings, NodeStatus};
+pub use overview::{MapCopy, Overview, OverviewError, OverviewReader, SeenMap, SeenNode};
+pub use store::{ClusterStore, EnterError, NoStore, StreamCopies};

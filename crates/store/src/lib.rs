@@ -37,7 +37,7 @@ mod settings;
 mod snapshots;
 mod viewpoint_parts;
 
-pub use data_folder::{DataDir, DataDirContents};
+pub use data_folder::{DataDir, DataDirContents, LeftMap};
 pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{

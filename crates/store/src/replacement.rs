@@ -9,8 +9,8 @@
 //! ```
 //!
 //! The file `replaces` names the folder of the old map, and the new name of that folder, which may be that of one that
-//! is set aside. While it exists, the next start completes what a crash interrupted, so that there is one map of the
-//! name at every moment.
+//! is set aside, or that is to be swept away. While it exists, the next start completes what a crash interrupted, so
+//! that there is one map of the name at every moment.
 
 use std::path::Path;
 
@@ -49,7 +49,7 @@ impl Replacement {
         let mut lines = text.lines();
         let mut folder = || lines.next().map(|line| (line.to_owned(), Entry::of(line)));
         match (folder(), folder()) {
-            (Some((old, Entry::Map { .. })), Some((kept, Entry::Map { .. } | Entry::SetAside))) => {
+            (Some((old, Entry::Map { .. })), Some((kept, to))) if is_a_place(&to) => {
                 Ok(Some(Self { old, kept }))
             }
             _ => Err(StoreError::damaged(&path, "it names no two folders of maps")),
@@ -65,6 +65,11 @@ impl Replacement {
         let renamed = files.rename(&old, &kept).and_then(|()| files.sync(maps));
         renamed.map_err(StoreError::io(old))
     }
+}
+
+/// True of what the folder of a map that was replaced may be called.
+fn is_a_place(entry: &Entry) -> bool {
+    matches!(entry, Entry::Map { .. } | Entry::SetAside | Entry::Unfinished)
 }
 
 /// Removes the file from the new map's folder, which completes the replacement.

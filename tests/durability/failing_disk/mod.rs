@@ -5,6 +5,7 @@
 #![expect(unreachable_pub, reason = "a test has no crate to reach it from")]
 
 mod incarnations;
+mod leaving;
 mod leftovers;
 mod renaming;
 mod workload;

@@ -33,6 +33,14 @@ impl BasePointers {
         Ok(Some((base, entry.revision)))
     }
 
+    /// The revision that the next change expects, also of a map whose base was forgotten.
+    ///
+    /// # Errors
+    /// Nobody answered.
+    pub fn last_revision(&self, map: Uuid) -> Result<u64, BaseError> {
+        Ok(self.0.last_revision(&key(map))?)
+    }
+
     /// Makes a file, which is there, the base of a map, and says the new revision.
     ///
     /// # Errors

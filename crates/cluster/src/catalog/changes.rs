@@ -10,6 +10,7 @@ use mrol_map::map::MapName;
 use mrol_service::replication::NodeName;
 use uuid::Uuid;
 
+use super::error::CatalogError;
 use super::hints::Hints;
 use super::listing::Listing;
 use crate::bucket::{Bucket, BucketError};
@@ -29,23 +30,6 @@ pub struct Catalog {
     bucket: Bucket,
     /// The greatest revision that was seen: what is older comes from a server that lags.
     seen: Arc<AtomicU64>,
-}
-
-/// Why the list was not read or changed.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum CatalogError {
-    /// Nobody answered, and nothing was changed.
-    #[error("{0}")]
-    Unavailable(String),
-    /// Nobody acknowledged a change: it is there, or not.
-    #[error("{0}")]
-    Unknown(String),
-    /// What is there is no list of maps.
-    #[error("the list of maps cannot be read: {0}")]
-    Damaged(String),
-    /// No more maps can be listed.
-    #[error("the cluster's list of maps is full: delete one first")]
-    Full,
 }
 
 impl Catalog {
@@ -84,9 +68,8 @@ impl Catalog {
     /// # Errors
     /// Says whether it may be there.
     pub fn enter(&self, name: &MapName, uuid: Uuid) -> Result<Uuid, CatalogError> {
-        self.change(|listing| match listing.map(name) {
-            Some(there) => Ok((there.uuid, false)),
-            None if listing.is_full() => Err(CatalogError::Full),
+        self.change(|listing| match listing.check_place(name, uuid)? {
+            Some(there) => Ok((there, false)),
             None => {
                 listing.enter(name, uuid);
                 Ok((uuid, true))

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use uuid::Uuid;
 
+use super::error::CatalogError;
+
 /// Maps and deleted maps that are listed, at most: the list is one message of NATS.
 const MAPS_MAX: usize = 4_000;
 
@@ -59,6 +61,26 @@ impl Listing {
         self.maps.get(name.as_str())
     }
 
+    /// Which map has the name where this one is to be listed; none where the name is free and it may be listed.
+    ///
+    /// # Errors
+    /// It is listed under another name, was deleted, or the list is full.
+    pub(crate) fn check_place(&self, name: &MapName, uuid: Uuid) -> Result<Option<Uuid>, CatalogError> {
+        if let Some(there) = self.map(name) {
+            return Ok(Some(there.uuid));
+        }
+        if let Some((other, _)) = self.maps().find(|(_, entry)| entry.uuid == uuid) {
+            return Err(CatalogError::OtherName(other));
+        }
+        if self.is_deleted(uuid) {
+            return Err(CatalogError::Deleted(uuid));
+        }
+        if self.maps.len() + self.deleted.len() >= MAPS_MAX {
+            return Err(CatalogError::Full);
+        }
+        Ok(None)
+    }
+
     /// True of a map that was deleted: no node keeps a copy.
     pub fn is_deleted(&self, uuid: Uuid) -> bool {
         self.deleted.contains(&uuid)
@@ -72,11 +94,6 @@ impl Listing {
     /// Enters a map under a name that is free.
     pub(super) fn enter(&mut self, name: &MapName, uuid: Uuid) {
         self.maps.insert(name.as_str().to_owned(), MapEntry::new(uuid));
-    }
-
-    /// True where no more maps can be listed.
-    pub(super) fn is_full(&self) -> bool {
-        self.maps.len() + self.deleted.len() >= MAPS_MAX
     }
 
     /// Takes a map out for good, and says its uuid.
@@ -116,6 +133,19 @@ mod tests {
         assert!(listing.is_deleted(one) && !listing.is_deleted(two));
         listing.forget(&BTreeSet::from([one]));
         assert!(!listing.is_deleted(one));
+    }
+
+    #[test]
+    fn a_map_is_listed_once_and_not_again_once_it_was_deleted() {
+        let (mut listing, [one, two]) = (Listing::default(), [1, 2].map(Uuid::from_u128));
+        assert_eq!(listing.check_place(&name("hall"), one), Ok(None));
+        listing.enter(&name("hall"), one);
+        assert_eq!(listing.check_place(&name("hall"), one), Ok(Some(one)));
+        assert_eq!(listing.check_place(&name("hall"), two), Ok(Some(one)));
+        assert_eq!(listing.check_place(&name("yard"), one), Err(CatalogError::OtherName(name("hall"))));
+        listing.delete(&name("hall"));
+        assert_eq!(listing.check_place(&name("hall"), one), Err(CatalogError::Deleted(one)));
+        assert_eq!(listing.check_place(&name("hall"), two), Ok(None));
     }
 
     #[test]

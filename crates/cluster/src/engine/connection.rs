@@ -59,6 +59,16 @@ impl Engine {
         self.0.acknowledgments.record(took);
     }
 
+    /// Version of the server that is connected.
+    pub fn server_version(&self) -> String {
+        self.0.client.server_info().version
+    }
+
+    /// Bytes of the largest message that the server takes.
+    pub fn max_payload(&self) -> usize {
+        self.0.client.server_info().max_payload
+    }
+
     /// Waits for what needs the connection. Not for an async thread, on which it panics.
     pub(crate) fn block_on<F: Future>(&self, future: F) -> F::Output {
         self.0.handle.block_on(future)

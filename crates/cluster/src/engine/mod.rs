@@ -18,4 +18,4 @@ pub(crate) use batch::BatchMessage;
 pub use connect_error::ConnectError;
 pub use connection::Engine;
 pub use settings::{Credentials, EngineSettings};
-pub use streams::{StreamError, StreamState};
+pub use streams::{StreamError, StreamServers, StreamState};

@@ -40,6 +40,17 @@ pub struct StreamState {
     pub last_sequence: u64,
 }
 
+/// The servers that keep a stream.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct StreamServers {
+    /// How many are to keep it.
+    pub replicas: usize,
+    /// The one that leads it; none while they elect one. Unknown of a NATS server by itself.
+    pub leader: Option<String>,
+    /// Those that lack what the leader has, or are not reached.
+    pub behind: Vec<String>,
+}
+
 impl Engine {
     /// Makes a stream where there is none. One that is there stays as it is.
     pub(crate) async fn create_stream(&self, config: &Config) -> Result<(), StreamError> {
@@ -61,9 +72,43 @@ impl Engine {
             state: StreamState,
         }
         let info = self.call::<Info>(&format!("STREAM.INFO.{stream}"), &(), WITHIN).await;
-        let failed =
-            |error: CallError| StreamError::Failed { stream: stream.to_owned(), cause: error.to_string() };
-        info.map(|info| info.state).map_err(failed)
+        info.map(|info| info.state).map_err(|error| failed_of(stream, error))
+    }
+
+    /// The servers that keep a stream, as its leader says.
+    pub(crate) async fn stream_servers(&self, stream: &str) -> Result<StreamServers, StreamError> {
+        #[derive(Deserialize)]
+        struct Info {
+            config: Kept,
+            #[serde(default)]
+            cluster: Servers,
+        }
+        #[derive(Deserialize)]
+        struct Kept {
+            num_replicas: usize,
+        }
+        #[derive(Default, Deserialize)]
+        struct Servers {
+            leader: Option<String>,
+            #[serde(default)]
+            replicas: Vec<Replica>,
+        }
+        #[derive(Deserialize)]
+        struct Replica {
+            name: String,
+            #[serde(default)]
+            current: bool,
+            #[serde(default)]
+            offline: bool,
+        }
+        let info = self.call::<Info>(&format!("STREAM.INFO.{stream}"), &(), WITHIN).await;
+        let Info { config, cluster } = info.map_err(|error| failed_of(stream, error))?;
+        let behind = cluster.replicas.into_iter().filter(|replica| replica.offline || !replica.current);
+        Ok(StreamServers {
+            replicas: config.num_replicas,
+            leader: cluster.leader,
+            behind: behind.map(|replica| replica.name).collect(),
+        })
     }
 
     /// Deletes the messages of a stream before this one, which stays.
@@ -92,10 +137,16 @@ impl Engine {
         let endpoint = format!("STREAM.{what}.{stream}");
         match self.call::<IgnoredAny>(&endpoint, question, WITHIN).await {
             Ok(_) => Ok(()),
-            Err(CallError::Api(ApiError { err_code: ApiError::NO_STREAM, .. })) => {
-                Err(StreamError::Missing(stream.to_owned()))
-            }
-            Err(error) => Err(StreamError::Failed { stream: stream.to_owned(), cause: error.to_string() }),
+            Err(error) => Err(failed_of(stream, error)),
         }
+    }
+}
+
+fn failed_of(stream: &str, error: CallError) -> StreamError {
+    match error {
+        CallError::Api(ApiError { err_code: ApiError::NO_STREAM, .. }) => {
+            StreamError::Missing(stream.to_owned())
+        }
+        error => StreamError::Failed { stream: stream.to_owned(), cause: error.to_string() },
     }
 }

@@ -45,6 +45,11 @@ impl JetStreamLog {
         Self::of(engine, map, names)
     }
 
+    /// The name of the stream of a map's log.
+    pub fn stream_of(map: Uuid) -> String {
+        LogNames::of(map).stream
+    }
+
     /// Deletes the log of a map, if there is one.
     ///
     /// # Errors

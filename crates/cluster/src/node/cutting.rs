@@ -8,9 +8,10 @@ use mrol_service::MapService;
 use mrol_service::replication::Base;
 use uuid::Uuid;
 
-use super::joined::{Joined, blocking};
+use super::blocking::blocking;
 use crate::bases::BaseError;
 use crate::jetstream_log::JetStreamLog;
+use crate::store::ClusterStore;
 
 /// Bytes of a log behind its base after which a new base is put.
 const BYTES_MAX: u64 = 256 << 20;
@@ -21,14 +22,14 @@ const LOOKED_EVERY: Duration = Duration::from_secs(30);
 
 /// Puts bases for a map that this node leads.
 pub(super) struct Cutting {
-    joined: Joined,
+    joined: ClusterStore,
     log: Arc<JetStreamLog>,
     map: Uuid,
     looked: Instant,
 }
 
 impl Cutting {
-    pub(super) fn of(joined: Joined, log: Arc<JetStreamLog>, map: Uuid) -> Self {
+    pub(super) fn of(joined: ClusterStore, log: Arc<JetStreamLog>, map: Uuid) -> Self {
         Self { joined, log, map, looked: Instant::now() }
     }
 
@@ -70,7 +71,7 @@ impl Cutting {
 }
 
 fn put_base(
-    joined: &Joined,
+    joined: &ClusterStore,
     log: &JetStreamLog,
     map: Uuid,
     before: Option<&(Base, u64)>,

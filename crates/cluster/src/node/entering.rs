@@ -9,16 +9,16 @@ use tokio::sync::{Mutex, mpsc, oneshot};
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use super::joined::{Joined, blocking, no_quorum};
-use super::keepers::{Wish, remove_log};
+use super::blocking::{blocking, no_quorum};
+use super::keepers::Wish;
 use crate::catalog::{CatalogError, Listing};
-use crate::jetstream_log::JetStreamLog;
+use crate::store::{ClusterStore, EnterError};
 
 /// Enters maps into the cluster's list and deletes them.
 #[derive(Debug)]
 pub(super) struct Entering {
     /// None before NATS has answered.
-    joined: Arc<OnceLock<Joined>>,
+    joined: Arc<OnceLock<ClusterStore>>,
     wishes: mpsc::UnboundedSender<Wish>,
     /// The list as it was read last for a map that this node has no copy of, and when.
     looked: Mutex<Option<(Instant, Listing)>>,
@@ -31,11 +31,11 @@ const LOOKED_FOR: Duration = Duration::from_millis(100);
 const COPIED_WITHIN: Duration = Duration::from_secs(5);
 
 impl Entering {
-    pub(super) fn new(joined: Arc<OnceLock<Joined>>, wishes: mpsc::UnboundedSender<Wish>) -> Self {
+    pub(super) fn new(joined: Arc<OnceLock<ClusterStore>>, wishes: mpsc::UnboundedSender<Wish>) -> Self {
         Self { joined, wishes, looked: Mutex::default() }
     }
 
-    fn joined(&self) -> Result<Joined, ServiceError> {
+    fn joined(&self) -> Result<ClusterStore, ServiceError> {
         self.joined
             .get()
             .cloned()
@@ -70,20 +70,10 @@ impl Entering {
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
         let (joined, of, uuid) = (self.joined()?, name.clone(), new.uuid);
         let entered = blocking(move || -> Result<Uuid, ServiceError> {
-            // What the list names is there.
-            let NewMap { uuid, base, file } = new;
-            joined.bases.put(uuid, &base, &file).map_err(|error| no_quorum(&error))?;
-            joined.pointers.change(uuid, &base, 0).map_err(|error| no_quorum(&error))?;
-            JetStreamLog::create(&joined.engine, uuid).map_err(|error| no_quorum(&error))?;
-            let entered = joined.catalog.enter(&of, uuid);
-            let may_be_there = match &entered {
-                Ok(there) => *there == uuid,
-                Err(error) => matches!(error, CatalogError::Unknown(_)),
-            };
-            if !may_be_there && let Err(error) = remove_log(&joined, uuid) {
-                tracing::debug!(%error, "what was put for a map that was not entered is still there");
-            }
-            entered.map_err(|error| told(&of, error))
+            joined.enter(&of, &new).map_err(|error| match error {
+                EnterError::NotPut(why) => no_quorum(&why),
+                EnterError::Catalog(error) => told(&of, error),
+            })
         });
         let there = entered.await?;
         self.wait(name, there, true).await?;
@@ -101,7 +91,7 @@ impl Entering {
                 return Err(missing());
             }
             // No node can change it any more, even one that has not heard of it.
-            if let Err(error) = remove_log(&joined, uuid) {
+            if let Err(error) = joined.remove(uuid) {
                 tracing::debug!(map = %of, error, "its log is still there");
             }
             Ok(uuid)
@@ -143,6 +133,10 @@ fn told(name: &MapName, error: CatalogError) -> ServiceError {
             ServiceError::new(Reason::OutcomeUnknown, message)
         }
         full @ CatalogError::Full => ServiceError::new(Reason::TooManyMaps, full.to_string()),
+        // The maps of a node's callers have uuids that no map had before.
+        taken @ (CatalogError::OtherName(_) | CatalogError::Deleted(_)) => {
+            ServiceError::new(Reason::MapExists, taken.to_string())
+        }
         damaged @ CatalogError::Damaged(_) => ServiceError::new(Reason::CatalogBusy, damaged.to_string()),
     }
 }

@@ -13,13 +13,13 @@ use parking_lot::Mutex;
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use super::joined::Joined;
 use super::settings::NodeSettings;
 use super::view::{Seen, View};
 use crate::beat::{Beat, MapHead};
 use crate::beats::{BEAT_EVERY, NodeBeat};
 use crate::forwarder::Forwarder;
 use crate::liveness::Liveness;
+use crate::store::ClusterStore;
 
 /// How long a port of a silent node may take to answer.
 const PORT_WITHIN: Duration = Duration::from_millis(200);
@@ -27,7 +27,7 @@ const PORT_WITHIN: Duration = Duration::from_millis(200);
 /// A node's beats. They have a thread of their own, so that nothing else that the node does delays them.
 pub(super) struct Heart {
     pub(super) settings: NodeSettings,
-    pub(super) joined: Joined,
+    pub(super) joined: ClusterStore,
     pub(super) service: MapService,
     /// Is told the addresses of the others.
     pub(super) forwarder: Arc<Forwarder>,

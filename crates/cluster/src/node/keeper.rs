@@ -11,12 +11,13 @@ use mrol_service::{Lead, MapService, Reason, ServiceError};
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::blocking::{blocking, no_quorum};
 use super::choice::{Choice, Known, choose};
 use super::cutting::Cutting;
-use super::joined::{Joined, blocking, no_quorum};
 use super::view::View;
 use crate::following::Following;
 use crate::jetstream_log::JetStreamLog;
+use crate::store::ClusterStore;
 
 /// Pause before a copy is tried again.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -27,7 +28,7 @@ pub(super) struct Keeper {
     /// Version of the records that it writes.
     pub(super) record_version: u32,
     pub(super) service: MapService,
-    pub(super) joined: Joined,
+    pub(super) joined: ClusterStore,
     pub(super) name: MapName,
     pub(super) uuid: Uuid,
     /// The node that is to lead the map whenever it can.

@@ -12,12 +12,12 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
 use uuid::Uuid;
 
-use super::joined::{Joined, blocking};
+use super::blocking::blocking;
 use super::keeper::Keeper;
 use super::settings::NodeSettings;
 use super::view::View;
 use crate::catalog::Listing;
-use crate::jetstream_log::JetStreamLog;
+use crate::store::ClusterStore;
 
 /// How long a copy that an operation waits for may take to come or to go.
 const DONE_WITHIN: Duration = Duration::from_secs(20);
@@ -44,7 +44,7 @@ pub(super) struct Keepers {
     node: NodeName,
     record_version: u32,
     service: MapService,
-    joined: Joined,
+    joined: ClusterStore,
     view: watch::Receiver<View>,
     /// How often this node took a map over.
     takeovers: Arc<AtomicU64>,
@@ -71,7 +71,7 @@ impl Keepers {
     pub(super) fn new(
         settings: &NodeSettings,
         service: MapService,
-        joined: Joined,
+        joined: ClusterStore,
         view: watch::Receiver<View>,
         takeovers: Arc<AtomicU64>,
     ) -> Self {
@@ -199,7 +199,7 @@ impl Keepers {
         }
         let (joined, forgotten) = (self.joined.clone(), due.clone());
         let cleared = blocking(move || -> Result<(), String> {
-            due.iter().try_for_each(|uuid| remove_log(&joined, *uuid))?;
+            due.iter().try_for_each(|uuid| joined.remove(*uuid))?;
             joined.catalog.forget(&due).map_err(|error| error.to_string())
         });
         match cleared.await {
@@ -207,16 +207,6 @@ impl Keepers {
             Err(error) => tracing::debug!(error, "what is left of maps that were deleted is not gone yet"),
         }
     }
-}
-
-/// Removes what NATS has of a map: its log, its base and what points there.
-pub(super) fn remove_log(joined: &Joined, uuid: Uuid) -> Result<(), String> {
-    JetStreamLog::delete(&joined.engine, uuid).map_err(|error| error.to_string())?;
-    if let Some((base, revision)) = joined.pointers.read(uuid).map_err(|error| error.to_string())? {
-        joined.bases.delete(uuid, &base).map_err(|error| error.to_string())?;
-        joined.pointers.forget(uuid, revision).map_err(|error| error.to_string())?;
-    }
-    Ok(())
 }
 
 /// Waits for what an operation wishes; where it does not come in time, the operation hears nothing.

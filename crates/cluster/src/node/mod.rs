@@ -4,7 +4,7 @@
 //!
 //! 1. `settings`, `view`: what a node is made of, and what it sees of the others.
 //! 2. `choice`: who is to lead a map, by what is seen.
-//! 3. `joined`: the connection to NATS, once there is one, with all that is kept there.
+//! 3. `blocking`: questions to NATS, which block.
 //! 4. `heart`: beats every two seconds, and sees who is gone.
 //! 5. `cutting`: puts a base and cuts the front of a log off.
 //! 6. `keeper`: keeps this node's copy of one map, and leads it where it is to.
@@ -12,11 +12,11 @@
 //! 8. `entering`: enters maps into the list and deletes them, for the operations of the service.
 //! 9. `server`: [`Node`], which puts these together.
 
+mod blocking;
 mod choice;
 mod cutting;
 mod entering;
 mod heart;
-mod joined;
 mod keeper;
 mod keepers;
 mod server;

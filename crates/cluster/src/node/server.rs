@@ -16,15 +16,16 @@ use tokio::sync::{mpsc, watch};
 use tokio::task;
 use uuid::Uuid;
 
+use super::blocking::blocking;
 use super::entering::Entering;
 use super::heart::Heart;
-use super::joined::{Joined, NotJoined, blocking};
 use super::keepers::{Keepers, Wish};
 use super::settings::NodeSettings;
 use super::view::View;
 use crate::beat::MapHead;
 use crate::engine::ConnectError;
 use crate::forwarder::Forwarder;
+use crate::store::{ClusterStore, NoStore};
 
 /// Pause before NATS is tried again.
 const CONNECT_AGAIN: Duration = Duration::from_secs(1);
@@ -33,7 +34,7 @@ const CONNECT_AGAIN: Duration = Duration::from_secs(1);
 pub struct Node {
     settings: NodeSettings,
     forwarder: Arc<Forwarder>,
-    joined: Arc<OnceLock<Joined>>,
+    joined: Arc<OnceLock<ClusterStore>>,
     view: watch::Sender<View>,
     /// Since when a copy is behind those of others, or not there.
     behind_since: Arc<Mutex<Option<Instant>>>,
@@ -124,11 +125,11 @@ impl Node {
     }
 
     /// Connects, again and again. What is wrong in the settings is said each time.
-    async fn join(&self) -> Joined {
+    async fn join(&self) -> ClusterStore {
         let mut last_said = String::new();
         loop {
-            let settings = self.settings.clone();
-            let error = match blocking(move || Joined::join(&settings)).await {
+            let settings = self.settings.engine.clone();
+            let error = match blocking(move || ClusterStore::create(&settings)).await {
                 Ok(joined) => return joined,
                 Err(error) => error,
             };
@@ -214,12 +215,12 @@ impl Node {
 }
 
 /// True where waiting helps.
-fn is_patient(error: &NotJoined) -> bool {
+fn is_patient(error: &NoStore) -> bool {
     match error {
-        NotJoined::Connect(error) => {
+        NoStore::Connect(error) => {
             matches!(error, ConnectError::NoServer { .. } | ConnectError::NoQuorum { .. })
         }
-        NotJoined::Stream(_) => true,
+        NoStore::Stream(_) => true,
     }
 }
 

@@ -1,6 +1,7 @@
 //! The log of a map in streams of real NATS servers, which are killed, halted and put back.
 #![expect(clippy::unwrap_used, reason = "tests fail where their servers do")]
 
+mod adopting;
 mod bases;
 mod beats;
 mod connecting;

@@ -21,14 +21,14 @@ use crate::support::NatsServers;
 const WITHIN: Duration = Duration::from_secs(40);
 
 /// A server with its node; its port is one at which nothing listens once it is gone.
-struct Server {
-    service: MapService,
-    node: Arc<Node>,
-    runtime: Runtime,
+pub(crate) struct Server {
+    pub(crate) service: MapService,
+    pub(crate) node: Arc<Node>,
+    pub(crate) runtime: Runtime,
     _port: TcpListener,
 }
 
-fn name(text: &str) -> MapName {
+pub(crate) fn name(text: &str) -> MapName {
     MapName::new(text).unwrap()
 }
 
@@ -37,7 +37,7 @@ fn forwarder(node: &str) -> Forwarder {
 }
 
 impl Server {
-    fn start(servers: &NatsServers, node: &str, folder: &Path) -> Self {
+    pub(crate) fn start(servers: &NatsServers, node: &str, folder: &Path) -> Self {
         let port = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("http://{}", port.local_addr().unwrap());
         let settings = NodeSettings {
@@ -62,42 +62,46 @@ impl Server {
     }
 
     /// Ends without a word to the others.
-    fn vanish(self) {
+    pub(crate) fn vanish(self) {
         self.runtime.block_on(self.node.end());
     }
 
-    fn create(&self, map: &str) -> bool {
+    pub(crate) fn create(&self, map: &str) -> bool {
         let settings = MapSettings::new(0.5, 2);
         retried(|| self.runtime.block_on(self.service.create_map(name(map), settings))).1
     }
 
-    fn version(&self, map: &str) -> Option<(u64, Option<ContentHash>)> {
+    pub(crate) fn version(&self, map: &str) -> Option<(u64, Option<ContentHash>)> {
         let version = self.runtime.block_on(self.service.version_of(&name(map))).ok()?;
         Some((version.revision, version.content_hash))
     }
 
-    fn leads(&self, map: &str) -> bool {
+    pub(crate) fn leads(&self, map: &str) -> bool {
         let lead = self.runtime.block_on(self.service.lead_of(&name(map)));
         lead.is_ok_and(|lead| matches!(&*lead.borrow(), Lead::Shared { is_here: true, .. }))
     }
 
-    /// Inserts a scan of a voxel of its own, under its number.
-    fn insert(&self, map: &str, number: u64) -> Result<u64, ServiceError> {
+    /// A scan of a voxel of its own, under its number.
+    pub(crate) fn scan(number: u64) -> ScanRequest {
         let points = vec![Point::new(0.25 + number as f32 * 0.5, 0.25, 0.25)].into();
-        let scan = ScanRequest {
+        ScanRequest {
             scan_id: Some(number),
             guess: Guess::Pose(Pose::identity()),
             at_guess: true,
             ..ScanRequest::new(RobotName::new("robot").unwrap(), points)
-        };
-        let answer = self.runtime.block_on(self.service.insert_scan(&name(map), scan))?;
+        }
+    }
+
+    /// Inserts a scan of a voxel of its own, under its number.
+    pub(crate) fn insert(&self, map: &str, number: u64) -> Result<u64, ServiceError> {
+        let answer = self.runtime.block_on(self.service.insert_scan(&name(map), Self::scan(number)))?;
         Ok(answer.version.revision)
     }
 }
 
 /// Asks again until it is answered.
 #[track_caller]
-fn retried<T>(ask: impl Fn() -> Result<T, ServiceError>) -> T {
+pub(crate) fn retried<T>(ask: impl Fn() -> Result<T, ServiceError>) -> T {
     let begun = Instant::now();
     loop {
         match ask() {
@@ -113,7 +117,7 @@ fn retried<T>(ask: impl Fn() -> Result<T, ServiceError>) -> T {
 }
 
 #[track_caller]
-fn waited(what: &str, is_so: impl Fn() -> bool) -> Duration {
+pub(crate) fn waited(what: &str, is_so: impl Fn() -> bool) -> Duration {
     let begun = Instant::now();
     while !is_so() {
         assert!(begun.elapsed() < WITHIN, "{what}");
@@ -124,7 +128,7 @@ fn waited(what: &str, is_so: impl Fn() -> bool) -> Duration {
 
 /// The server that leads a map.
 #[track_caller]
-fn leader<'a>(servers: &[&'a Server], map: &str) -> &'a Server {
+pub(crate) fn leader<'a>(servers: &[&'a Server], map: &str) -> &'a Server {
     waited("a leader", || servers.iter().any(|server| server.leads(map)));
     servers.iter().find(|server| server.leads(map)).unwrap()
 }

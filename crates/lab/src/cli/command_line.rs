@@ -32,7 +32,7 @@ enum Command {
     Experiment(experiment::Experiment),
     /// The server, as `mrol serve`: what is measured in a process of its own
     #[command(hide = true)]
-    Serve(Serve),
+    Serve(Box<Serve>),
     /// The attackers of `experiment attack`, in a process of their own
     #[command(hide = true)]
     Attackers(experiment::Attackers),

@@ -168,8 +168,23 @@ impl DataDir {
         old: &Path,
         first: &Snapshot,
     ) -> Result<PathBuf, StoreError> {
-        let (new, old) = (Entry::folder_name(name, first.uuid), name_of(old));
-        let replacement = Replacement { kept: Entry::set_aside_name(&old), old };
+        self.replace_folder(name, old, Entry::set_aside_name(&name_of(old)), first)
+    }
+
+    /// Creates a map in the place of that in the folder `old`, which nobody uses, and renames that folder to `kept`;
+    /// returns where it lies then.
+    ///
+    /// # Errors
+    /// When the system refuses. Where the new map is there already, the next start completes the exchange.
+    pub(super) fn replace_folder(
+        &self,
+        name: &MapName,
+        old: &Path,
+        kept: String,
+        first: &Snapshot,
+    ) -> Result<PathBuf, StoreError> {
+        let new = Entry::folder_name(name, first.uuid);
+        let replacement = Replacement { old: name_of(old), kept };
         self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;
         replacement.keep_old(&*self.files, &self.maps)?;
         replacement::finish(&*self.files, &self.maps.join(&new))?;

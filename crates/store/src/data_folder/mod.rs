@@ -21,7 +21,9 @@
 
 mod contents;
 mod data_dir;
+mod leaving;
 mod node_mark;
 
 pub use contents::DataDirContents;
 pub use data_dir::DataDir;
+pub use leaving::LeftMap;

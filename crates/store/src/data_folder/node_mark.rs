@@ -33,14 +33,11 @@ impl DataDir {
         folder::replace(&*self.files, &self.node_mark(), format!("{node}\n").as_bytes())
     }
 
-    /// From now on the folder belongs to a server by itself.
+    /// From now on the folder belongs to a server by itself; it belonged to a node.
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn leave_cluster(&self) -> Result<(), StoreError> {
-        if self.node()?.is_none() {
-            return Ok(());
-        }
+    pub(super) fn forget_node(&self) -> Result<(), StoreError> {
         let path = self.node_mark();
         let removed = self.files.remove(&path).and_then(|()| self.files.sync(folder::folder_of(&path)));
         removed.map_err(StoreError::io(path))
@@ -61,10 +58,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let open = || DataDir::open(folder.path(), StoreSettings::default()).unwrap();
         assert_eq!(open().node().unwrap(), None);
-        open().leave_cluster().unwrap();
         open().set_node("n1").unwrap();
         assert_eq!(open().node().unwrap().as_deref(), Some("n1"));
-        open().leave_cluster().unwrap();
+        open().forget_node().unwrap();
         assert_eq!(open().node().unwrap(), None);
     }
 }

@@ -1,0 +1,76 @@
+//! A map is put at NATS and listed, or taken away.
+
+use mrol_map::map::MapName;
+use mrol_service::NewMap;
+use uuid::Uuid;
+
+use super::opening::ClusterStore;
+use crate::catalog::CatalogError;
+use crate::jetstream_log::JetStreamLog;
+
+/// Why a map was not entered into a cluster.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum EnterError {
+    /// Its base or its log could not be put: it is not listed.
+    #[error("{0}")]
+    NotPut(String),
+    /// The list was not read or changed.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+}
+
+impl ClusterStore {
+    /// Enters a map: puts its base, makes its log, and then lists it, so that what the list names is there. Says which
+    /// map has the name: this one, or another that had it before. A map that is listed already stays as it is; what an
+    /// attempt before this one left is put again. Not for an async thread.
+    ///
+    /// # Errors
+    /// Says whether the map may be listed.
+    pub fn enter(&self, name: &MapName, new: &NewMap) -> Result<Uuid, EnterError> {
+        let (listing, _) = self.catalog.read()?;
+        if let Some(there) = listing.check_place(name, new.uuid)? {
+            return Ok(there);
+        }
+        self.put(new)?;
+        let entered = self.catalog.enter(name, new.uuid);
+        let may_be_there = match &entered {
+            Ok(there) => *there == new.uuid,
+            Err(error) => matches!(error, CatalogError::Unknown(_) | CatalogError::OtherName(_)),
+        };
+        if !may_be_there && let Err(error) = self.remove(new.uuid) {
+            tracing::debug!(error, "what was put for a map that was not entered is still there");
+        }
+        Ok(entered?)
+    }
+
+    fn put(&self, NewMap { uuid, base, file }: &NewMap) -> Result<(), EnterError> {
+        let failed = |error: &dyn std::fmt::Display| EnterError::NotPut(error.to_string());
+        let log = JetStreamLog::create(&self.engine, *uuid).map_err(|error| failed(&error))?;
+        let used = log.used().map_err(|error| failed(&error))?;
+        if used.last_sequence > 0 {
+            let message = format!(
+                "NATS has a log of map {uuid} with {} messages, and no map of that uuid is listed: it was in the cluster \
+                 before",
+                used.messages
+            );
+            return Err(EnterError::NotPut(message));
+        }
+        let expected = self.pointers.last_revision(*uuid).map_err(|error| failed(&error))?;
+        self.bases.put(*uuid, base, file).map_err(|error| failed(&error))?;
+        self.pointers.change(*uuid, base, expected).map_err(|error| failed(&error))?;
+        Ok(())
+    }
+
+    /// Removes what NATS has of a map that is not listed: its log, its base and what points there.
+    ///
+    /// # Errors
+    /// NATS did not answer.
+    pub(crate) fn remove(&self, uuid: Uuid) -> Result<(), String> {
+        JetStreamLog::delete(&self.engine, uuid).map_err(|error| error.to_string())?;
+        if let Some((base, revision)) = self.pointers.read(uuid).map_err(|error| error.to_string())? {
+            self.bases.delete(uuid, &base).map_err(|error| error.to_string())?;
+            self.pointers.forget(uuid, revision).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,174 @@
+//! `mrol cluster adopt`: takes the maps of a server by itself into a cluster.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tokio::runtime::Runtime;
+use uuid::Uuid;
+
+use super::nats::{NatsOptions, engine_of};
+use mrol::console::parse;
+use mrol::console::{CliError, Output, bytes};
+use mrol_cluster::{ClusterStore, EnterError, Listing, NoStore, StreamError};
+use mrol_map::map::MapName;
+use mrol_service::{MapService, NewMap, ServiceSettings};
+use mrol_store::OpeningProgress;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol cluster adopt ./mrol-data --nats nats://10.0.0.1:4222,nats://10.0.0.2:4222
+  mrol cluster adopt ./mrol-data --map office --map yard --config mrol.toml    these maps only
+
+No server may use the folder meanwhile. Each map keeps its uuid and its revisions; what is in the folder stays as it is. A map
+whose name another map of the cluster has is refused, and nothing is done then. Done again, it goes on where it was ended.";
+
+/// Take the maps of a data folder into the cluster, while no server uses the folder
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Adopt {
+    /// The data folder of a server by itself
+    #[arg(value_name = "DATA_DIR")]
+    data_dir: PathBuf,
+    /// Only this map; may be repeated
+    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
+    maps: Vec<MapName>,
+    #[command(flatten)]
+    nats: NatsOptions,
+}
+
+impl Adopt {
+    pub(super) fn run(self, output: Output) -> Result<(), CliError> {
+        let Self { data_dir, maps, nats } = self;
+        let settings = nats.settings()?;
+        if !data_dir.join("maps").is_dir() {
+            let folder = data_dir.display();
+            return Err(CliError::usage(format!("{folder} is no data folder: it has no folder maps")));
+        }
+        let of_service = ServiceSettings { data_dir: Some(data_dir.clone()), ..settings.service_settings() };
+        let service = MapService::open(of_service, &OpeningProgress::default()).map_err(CliError::failed)?;
+        let runtime = Runtime::new().map_err(CliError::failed)?;
+        let chosen = chosen(&service, &maps)?;
+        let uuids = chosen.into_iter().map(|name| Ok((uuid_of(&runtime, &service, &name)?, name)));
+        let uuids = uuids.collect::<Result<Vec<(Uuid, MapName)>, CliError>>()?;
+        let store = ClusterStore::create(&engine_of(&settings)).map_err(not_made)?;
+        let (listing, _) = store.catalog.read().map_err(CliError::failed)?;
+        check_free(&listing, &uuids)?;
+        let output = output.with_bar_of(uuids.len(), "maps");
+        for (uuid, name) in uuids {
+            let is_there = listing.map(&name).is_some_and(|entry| entry.uuid == uuid);
+            output.print(&adopted(&runtime, &service, &store, name, is_there)?)?;
+            output.step();
+        }
+        output.clear_bar();
+        output.say(next_step(&data_dir, store.engine.servers()))
+    }
+}
+
+/// The maps that are named, or all.
+fn chosen(service: &MapService, named: &[MapName]) -> Result<Vec<MapName>, CliError> {
+    let named: BTreeSet<&MapName> = named.iter().collect();
+    let is_meant = |name: &MapName| named.is_empty() || named.contains(name);
+    if let Some(map) = service.unavailable_maps().into_iter().find(|map| is_meant(&map.name)) {
+        return Err(CliError::failed(format!("map {} cannot be opened: {}", map.name, map.reason)));
+    }
+    let there = service.map_names();
+    if let Some(missing) = named.iter().find(|name| !there.contains(name)) {
+        return Err(CliError::failed(format!("--map: there is no map {missing} in the data folder")));
+    }
+    Ok(there.into_iter().filter(is_meant).collect())
+}
+
+fn uuid_of(runtime: &Runtime, service: &MapService, name: &MapName) -> Result<Uuid, CliError> {
+    let version = runtime.block_on(service.version_of(name)).map_err(CliError::failed)?;
+    Ok(version.map_uuid)
+}
+
+/// Refuses maps whose names others have in the cluster, before anything is put.
+fn check_free(listing: &Listing, maps: &[(Uuid, MapName)]) -> Result<(), CliError> {
+    for (uuid, name) in maps {
+        let Some(entry) = listing.map(name).filter(|entry| entry.uuid != *uuid) else { continue };
+        return Err(CliError::failed(format!(
+            "map {name} of the cluster is another one ({}, this is {uuid}); nothing was done. Start the server by itself once \
+             more and give this one another name (`mrol maps rename {name} NEW`), or name the others with --map",
+            entry.uuid
+        )));
+    }
+    Ok(())
+}
+
+fn adopted(
+    runtime: &Runtime,
+    service: &MapService,
+    store: &ClusterStore,
+    name: MapName,
+    is_there: bool,
+) -> Result<Adopted, CliError> {
+    let NewMap { uuid, base, file } = runtime.block_on(service.to_share(&name)).map_err(CliError::failed)?;
+    let (revision, size) = (base.revision, file.len());
+    let map = name.to_string();
+    if !is_there {
+        let entered = store.enter(&name, &NewMap { uuid, base, file });
+        let there = entered.map_err(|error| not_entered(&name, &error))?;
+        if there != uuid {
+            return Err(CliError::failed(format!(
+                "map {name}: another of that name was entered meanwhile, {there}"
+            )));
+        }
+    }
+    Ok(Adopted { map, map_uuid: uuid.to_string(), revision, bytes: size, was_there: is_there })
+}
+
+fn not_entered(name: &MapName, error: &EnterError) -> CliError {
+    CliError::failed(format!(
+        "map {name} was not entered: {error}. Those before it are in the cluster; the same command goes on with this one"
+    ))
+}
+
+fn not_made(error: NoStore) -> CliError {
+    match error {
+        NoStore::Connect(error) => CliError::failed(error),
+        NoStore::Stream(error @ StreamError::Missing(_)) => CliError::failed(error),
+        NoStore::Stream(error) => CliError::failed(format!(
+            "{error}; each stream is kept on as many NATS servers as cluster.replicas says (MROL_CLUSTER__REPLICAS=1 for a \
+             NATS server by itself)"
+        )),
+    }
+}
+
+/// What is to be done next.
+fn next_step(data_dir: &Path, servers: &str) -> String {
+    let (servers, folder) = (servers.replace(", ", ","), data_dir.display());
+    format!(
+        "next: start the server of this folder as a node, and never by itself again, since its maps would get another history:\n  \
+         mrol serve --cluster {servers} --node NAME --data-dir {folder}"
+    )
+}
+
+#[derive(Serialize)]
+struct Adopted {
+    map: String,
+    map_uuid: String,
+    revision: u64,
+    bytes: usize,
+    /// True of a map that was in the cluster already.
+    was_there: bool,
+}
+
+impl Display for Adopted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { map, map_uuid, revision, was_there, .. } = self;
+        match was_there {
+            true => write!(f, "map {map} ({map_uuid}) is in the cluster already"),
+            false => {
+                let size = bytes(self.bytes);
+                write!(
+                    f,
+                    "map {map} ({map_uuid}) is in the cluster now, at revision {revision}: {size} were put"
+                )
+            }
+        }
+    }
+}

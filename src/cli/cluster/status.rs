@@ -1,0 +1,240 @@
+//! `mrol cluster status`: who is there, and who leads which map.
+
+use std::fmt;
+use std::fmt::Display;
+
+use serde::Serialize;
+
+use super::nats::NatsOptions;
+use super::table::{cells, table};
+use mrol::console::{CliError, Output, bytes};
+use mrol_cluster::{MapCopy, Overview, OverviewReader, SeenMap, SeenNode};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol cluster status --nats nats://10.0.0.1:4222
+  mrol cluster status --config mrol.toml --json | jq '.maps[] | select(.leader == null)'
+
+Each node beats every two seconds. One that does not for three is shown as silent. A copy that has parted has another history
+than the map's log: it takes no changes (`mrol cluster keep --help`).";
+
+/// Show the nodes, the maps, who leads them, and which copies are behind
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Status {
+    #[command(flatten)]
+    nats: NatsOptions,
+}
+
+impl Status {
+    pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
+        let seen = self.nats.reader()?.settled().map_err(CliError::failed)?;
+        output.print(&Report::of(&seen))
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    nodes: Vec<NodeRow>,
+    maps: Vec<MapRow>,
+}
+
+#[derive(Debug, Serialize)]
+struct NodeRow {
+    node: String,
+    live: bool,
+    version: String,
+    record_version: u32,
+    http: String,
+    grpc: String,
+    /// None where the node does not know.
+    free_bytes: Option<u64>,
+}
+
+#[derive(Debug, Serialize)]
+struct MapRow {
+    map: String,
+    map_uuid: String,
+    leader: Option<String>,
+    wished: Option<String>,
+    epoch: u64,
+    revision: u64,
+    copies: Vec<CopyRow>,
+}
+
+#[derive(Debug, Serialize)]
+struct CopyRow {
+    node: String,
+    live: bool,
+    revision: u64,
+    /// Revisions behind the furthest copy.
+    lag: u64,
+    parted: bool,
+}
+
+impl Report {
+    fn of(seen: &Overview) -> Self {
+        let nodes = seen.nodes.iter().map(NodeRow::of).collect();
+        Self { nodes, maps: seen.maps.iter().map(MapRow::of).collect() }
+    }
+
+    /// What somebody should look at.
+    fn warnings(&self) -> Vec<String> {
+        let silent = self.nodes.iter().filter(|node| !node.live).map(|node| {
+            let seconds = OverviewReader::SILENT_AFTER.as_secs();
+            format!("node {} is SILENT: no beat within {seconds} s", node.node)
+        });
+        let maps = self.maps.iter().flat_map(|map| {
+            let name = &map.map;
+            let unled = map.leader.is_none().then(|| {
+                format!("NO NODE LEADS map {name}: it takes no changes; a leader that is gone is replaced within ten seconds")
+            });
+            let parted = map.copies.iter().filter(|copy| copy.parted).map(move |copy| {
+                let node = &copy.node;
+                format!(
+                    "map {name}: the copy of node {node} has PARTED: it takes no changes; `mrol cluster keep NODE {name}` \
+                     makes one copy the map"
+                )
+            });
+            unled.into_iter().chain(parted)
+        });
+        silent.chain(maps).collect()
+    }
+}
+
+impl NodeRow {
+    fn of(SeenNode { node, is_live, beat }: &SeenNode) -> Self {
+        Self {
+            node: node.to_string(),
+            live: *is_live,
+            version: beat.version.clone(),
+            record_version: beat.record_version,
+            http: beat.http.clone(),
+            grpc: beat.grpc.clone(),
+            free_bytes: (beat.free_bytes < u64::MAX).then_some(beat.free_bytes),
+        }
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let state = if self.live { "live" } else { "SILENT" };
+        let free = self.free_bytes.map_or("?".to_owned(), |free| bytes(free as usize));
+        cells([&self.node, state, &self.version, &free, &self.grpc, &self.http])
+    }
+}
+
+impl MapRow {
+    fn of(map: &SeenMap) -> Self {
+        let copy = |copy: &MapCopy| CopyRow {
+            node: copy.node.to_string(),
+            live: copy.is_live,
+            revision: copy.head.revision,
+            lag: map.lag(copy),
+            parted: copy.head.is_parted,
+        };
+        Self {
+            map: map.name.to_string(),
+            map_uuid: map.uuid.to_string(),
+            leader: map.leader().map(|copy| copy.node.to_string()),
+            wished: map.wished.as_ref().map(ToString::to_string),
+            epoch: map.copies.iter().map(|copy| copy.head.epoch).max().unwrap_or_default(),
+            revision: map.furthest(),
+            copies: map.copies.iter().map(copy).collect(),
+        }
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let copies: Vec<String> = self.copies.iter().map(ToString::to_string).collect();
+        cells([
+            &self.map,
+            self.leader.as_deref().unwrap_or("NONE"),
+            self.wished.as_deref().unwrap_or("any"),
+            &self.epoch.to_string(),
+            &self.revision.to_string(),
+            &if copies.is_empty() { "no copies".to_owned() } else { copies.join(", ") },
+            &self.map_uuid,
+        ])
+    }
+}
+
+impl Display for CopyRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.node, self.revision)?;
+        if self.lag > 0 && !self.parted {
+            write!(f, " ({} behind)", self.lag)?;
+        }
+        f.write_str(if self.parted { " PARTED" } else { "" })?;
+        f.write_str(if self.live { "" } else { " silent" })
+    }
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let head = cells(["NODE", "STATE", "VERSION", "FREE", "GRPC", "HTTP"]);
+        let nodes: Vec<_> = [head].into_iter().chain(self.nodes.iter().map(NodeRow::cells)).collect();
+        writeln!(f, "{}\n", table(&nodes))?;
+        let head = cells(["MAP", "LEADER", "WISHED", "EPOCH", "REVISION", "COPIES", "UUID"]);
+        let maps: Vec<_> = [head].into_iter().chain(self.maps.iter().map(MapRow::cells)).collect();
+        write!(f, "{}", table(&maps))?;
+        let warnings = self.warnings();
+        if !warnings.is_empty() {
+            write!(f, "\n\n{}", warnings.join("\n"))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn copy(node: &str, revision: u64, lag: u64) -> CopyRow {
+        CopyRow { node: node.into(), live: true, revision, lag, parted: false }
+    }
+
+    #[test]
+    fn what_is_wrong_is_loud() {
+        let node = |node: &str, live| NodeRow {
+            node: node.into(),
+            live,
+            version: "0.2.0".into(),
+            record_version: 5,
+            http: "http://a:7333".into(),
+            grpc: "http://a:7334".into(),
+            free_bytes: Some(3 << 30),
+        };
+        let map = |map: &str, leader: Option<&str>, copies| MapRow {
+            map: map.into(),
+            map_uuid: "u".into(),
+            leader: leader.map(str::to_owned),
+            wished: None,
+            epoch: 3,
+            revision: 20,
+            copies,
+        };
+        let parted = CopyRow { parted: true, live: false, ..copy("c", 25, 0) };
+        let report = Report {
+            nodes: vec![node("a", true), node("b", false)],
+            maps: vec![
+                map("hall", Some("a"), vec![copy("a", 20, 0), copy("b", 18, 2), parted]),
+                map("yard", None, Vec::new()),
+            ],
+        };
+        let text = report.to_string();
+        for part in [
+            "a     live    0.2.0    3.0 GiB",
+            "b     SILENT",
+            "hall  a       any     3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
+            "yard  NONE    any     3      20        no copies",
+            "node b is SILENT: no beat within 3 s",
+            "NO NODE LEADS map yard",
+            "map hall: the copy of node c has PARTED",
+        ] {
+            assert!(text.contains(part), "{part} is not in\n{text}");
+        }
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(
+            (&json["maps"][0]["copies"][1]["lag"], &json["maps"][1]["leader"]),
+            (&2.into(), &().into())
+        );
+    }
+}
