@@ -211,7 +211,7 @@ impl MapService {
         let here = self.map_here(name).await;
         match (&here, &self.inner.settings.cluster) {
             (Err(error), Some(cluster)) if error.reason == Reason::MapNotFound => {
-                if !cluster.catalog.look_for(name).await {
+                if !cluster.catalog.look_for(name).await? {
                     return here;
                 }
                 self.map_here(name).await

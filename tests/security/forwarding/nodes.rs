@@ -25,6 +25,7 @@ use mrol_cluster::{Forwarder, ForwarderSettings};
 use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tower::ServiceExt;
+use uuid::Uuid;
 
 use super::log::SharedLog;
 
@@ -153,11 +154,11 @@ impl SharedCatalog for NoCatalog {
         none()
     }
 
-    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, bool> {
-        Box::pin(std::future::ready(false))
+    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
+        Box::pin(std::future::ready(Ok(false)))
     }
 
-    fn delete<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<(), ServiceError>> {
+    fn delete<'a>(&'a self, _: &'a MapName, _: Uuid) -> Later<'a, Result<(), ServiceError>> {
         none()
     }
 }

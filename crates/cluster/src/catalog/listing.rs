@@ -10,8 +10,10 @@ use uuid::Uuid;
 
 use super::error::CatalogError;
 
-/// Maps and deleted maps that are listed, at most: the list is one message of NATS.
+/// Maps that are listed, at most: the list is one message of NATS.
 const MAPS_MAX: usize = 4_000;
+/// Maps that were deleted and are not forgotten, at most.
+const DELETED_MAX: usize = 8_000;
 
 /// The maps of a cluster, by name, and those that were deleted. What a later version adds is kept, and means nothing to
 /// this one.
@@ -75,7 +77,7 @@ impl Listing {
         if self.is_deleted(uuid) {
             return Err(CatalogError::Deleted(uuid));
         }
-        if self.maps.len() + self.deleted.len() >= MAPS_MAX {
+        if self.maps.len() >= MAPS_MAX || self.deleted.len() >= DELETED_MAX {
             return Err(CatalogError::Full);
         }
         Ok(None)

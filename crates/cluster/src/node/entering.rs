@@ -21,12 +21,12 @@ pub(super) struct Entering {
     joined: Arc<OnceLock<ClusterStore>>,
     wishes: mpsc::UnboundedSender<Wish>,
     /// The list as it was read last for a map that this node has no copy of, and when.
-    looked: Mutex<Option<(Instant, Listing)>>,
+    looked: Mutex<Option<(Instant, Result<Listing, CatalogError>)>>,
 }
 
 /// How long a list that was read answers for maps that this node has no copy of: names that nobody has cost NATS a few
 /// questions a second, whoever asks for them.
-const LOOKED_FOR: Duration = Duration::from_millis(100);
+const LOOKED_FOR: Duration = Duration::from_millis(200);
 /// How long a request waits for a copy of a map that another node has just made.
 const COPIED_WITHIN: Duration = Duration::from_secs(5);
 
@@ -54,17 +54,24 @@ impl Entering {
         Err(ServiceError::new(Reason::OutcomeUnknown, message))
     }
 
-    /// The uuid of a map in the list of now.
-    async fn listed(&self, name: &MapName) -> Option<Uuid> {
+    /// The uuid of a map in the list of now; none where it is not listed.
+    ///
+    /// # Errors
+    /// `NoQuorum` where that is not known.
+    async fn listed(&self, name: &MapName) -> Result<Option<Uuid>, ServiceError> {
         let mut looked = self.looked.lock().await;
-        let is_new = |read: &Instant| read.elapsed() < LOOKED_FOR;
-        if !looked.as_ref().is_some_and(|(read, _)| is_new(read)) {
-            let joined = self.joined().ok()?;
-            let (listing, _) = blocking(move || joined.catalog.read()).await.ok()?;
-            *looked = Some((Instant::now(), listing));
+        let is_new = |(at, _): &(Instant, _)| at.elapsed() < LOOKED_FOR;
+        if !looked.as_ref().is_some_and(is_new) {
+            let joined = self.joined()?;
+            // That it could not be read holds as long: whoever waits behind does not ask again.
+            let read = blocking(move || joined.catalog.read()).await.map(|(listing, _)| listing);
+            *looked = Some((Instant::now(), read));
         }
-        let (_, listing) = looked.as_ref()?;
-        listing.map(name).map(|entry| entry.uuid)
+        match looked.as_ref() {
+            Some((_, Ok(listing))) => Ok(listing.map(name).map(|entry| entry.uuid)),
+            Some((_, Err(error))) => Err(told(name, error.clone())),
+            None => Ok(None),
+        }
     }
 
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
@@ -80,23 +87,20 @@ impl Entering {
         Ok(there == uuid)
     }
 
-    async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
+    async fn delete_map(&self, name: &MapName, uuid: Uuid) -> Result<(), ServiceError> {
         let (joined, of) = (self.joined()?, name.clone());
-        let deleted = blocking(move || -> Result<Uuid, ServiceError> {
-            let (listing, _) = joined.catalog.read().map_err(|error| told(&of, error))?;
-            let missing =
-                || ServiceError::new(Reason::MapNotFound, format!("map {of} is none of the cluster's"));
-            let uuid = listing.map(&of).ok_or_else(missing)?.uuid;
+        let deleted = blocking(move || -> Result<(), ServiceError> {
             if !joined.catalog.delete(&of, uuid).map_err(|error| told(&of, error))? {
-                return Err(missing());
+                let message = format!("map {of} is none of the cluster's");
+                return Err(ServiceError::new(Reason::MapNotFound, message));
             }
             // No node can change it any more, even one that has not heard of it.
             if let Err(error) = joined.remove(uuid) {
                 tracing::debug!(map = %of, error, "its log is still there");
             }
-            Ok(uuid)
+            Ok(())
         });
-        let uuid = deleted.await?;
+        deleted.await?;
         self.wait(name, uuid, false).await
     }
 }
@@ -106,20 +110,16 @@ impl SharedCatalog for Entering {
         Box::pin(self.enter_map(name, new))
     }
 
-    fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, bool> {
+    fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(async move {
-            match self.listed(name).await {
-                Some(uuid) => {
-                    let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true)).await;
-                    waited.is_ok_and(|waited| waited.is_ok())
-                }
-                None => false,
-            }
+            let Some(uuid) = self.listed(name).await? else { return Ok(false) };
+            let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true)).await;
+            Ok(waited.is_ok_and(|waited| waited.is_ok()))
         })
     }
 
-    fn delete<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<(), ServiceError>> {
-        Box::pin(self.delete_map(name))
+    fn delete<'a>(&'a self, name: &'a MapName, uuid: Uuid) -> Later<'a, Result<(), ServiceError>> {
+        Box::pin(self.delete_map(name, uuid))
     }
 }
 

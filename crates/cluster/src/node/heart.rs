@@ -46,12 +46,12 @@ impl Heart {
             match self.beat_once(&mut liveness, &mut beats) {
                 Ok(()) if is_silent => {
                     is_silent = false;
-                    tracing::info!("NATS acknowledges beats again");
+                    tracing::info!("this node's beats count again");
                 }
                 Ok(()) => {}
                 Err(error) if !is_silent => {
                     is_silent = true;
-                    tracing::warn!(error, "NATS does not acknowledge this node's beat: it takes no map over");
+                    tracing::warn!(error, "this node's beats do not count: it takes no map over");
                 }
                 Err(_) => {}
             }
@@ -71,12 +71,19 @@ impl Heart {
         let read = self.joined.beats.read().map_err(text)?;
         let revisions = read.iter().map(|beat| (beat.node.clone(), beat.revision)).collect();
         if !liveness.beats_read(&revisions) {
-            // Of a server that lags.
-            return Ok(());
+            // Of a server that lags, unless somebody else beats under this name.
+            let there = read.iter().find(|beat| beat.node == self.settings.name);
+            return match there.filter(|there| there.beat.grpc != own.grpc) {
+                Some(twin) => Err(format!("another process, at {}, beats as this node", twin.beat.grpc)),
+                None => Ok(()),
+            };
         }
         let others: Vec<NodeBeat> = read.into_iter().filter(|beat| beat.node != self.settings.name).collect();
         let silent: Vec<NodeName> = liveness.silent().cloned().collect();
-        for other in others.iter().filter(|other| silent.contains(&other.node)) {
+        // Each look may take a while: those that are gone anyhow are not looked at.
+        let doubtful = |other: &&NodeBeat| silent.contains(&other.node) && !liveness.is_gone(&other.node);
+        let doubtful: Vec<_> = others.iter().filter(doubtful).collect();
+        for other in doubtful {
             if is_refused(&other.beat.grpc) {
                 liveness.port_refused(&other.node);
             }
@@ -93,6 +100,9 @@ impl Heart {
         drop(since);
         tell_changes(&self.view.borrow(), &now);
         let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
+        // The secret of the cluster is sent there: in the clear only where this node serves in the clear as well.
+        let is_secured = own.grpc.starts_with("https://");
+        let grpc = grpc.filter(|(_, address)| !is_secured || address.starts_with("https://"));
         self.forwarder.set_addresses(grpc.collect());
         self.view.send_replace(now);
         Ok(())

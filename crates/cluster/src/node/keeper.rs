@@ -63,12 +63,11 @@ impl Keeper {
         match self.service.uuid_of_copy(&self.name).await? {
             Some(uuid) if uuid == self.uuid => {}
             Some(other) => {
-                let message = format!(
-                    "map {} of this node is another than the cluster's: {other}, not {}; delete it here, or take it in under \
-                     another name (`mrol cluster adopt`)",
-                    self.name, self.uuid
+                tracing::error!(
+                    map = %self.name, %other, listed = %self.uuid,
+                    "this node has another map of this name than the cluster: it is kept under another name"
                 );
-                return Err(ServiceError::new(Reason::MapExists, message));
+                self.load_base(true).await?;
             }
             None => self.load_base(false).await?,
         }

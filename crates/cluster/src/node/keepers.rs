@@ -188,8 +188,8 @@ impl Keepers {
     async fn forget_deleted(&mut self) {
         let view = self.view.borrow().clone();
         let is_held = |uuid: &Uuid| view.others.values().any(|seen| seen.beat.maps.contains_key(uuid));
-        // One of the nodes is enough.
-        let is_first = view.others.iter().all(|(node, seen)| !seen.is_live || *node > self.node);
+        // A node that is gone may come back with a copy that its last beat did not have yet. One of the nodes is enough.
+        let is_first = view.others.iter().all(|(node, seen)| seen.is_live && *node > self.node);
         let due = |(uuid, since): (&Uuid, &Instant)| {
             (is_first && since.elapsed() > DELETED_FOR && !is_held(uuid)).then_some(*uuid)
         };
@@ -197,14 +197,22 @@ impl Keepers {
         if due.is_empty() {
             return;
         }
-        let (joined, forgotten) = (self.joined.clone(), due.clone());
-        let cleared = blocking(move || -> Result<(), String> {
-            due.iter().try_for_each(|uuid| joined.remove(*uuid))?;
-            joined.catalog.forget(&due).map_err(|error| error.to_string())
+        let joined = self.joined.clone();
+        let cleared = blocking(move || -> Result<BTreeSet<Uuid>, String> {
+            let removed = |uuid: &Uuid| match joined.remove(*uuid) {
+                Ok(()) => true,
+                Err(error) => {
+                    tracing::debug!(%uuid, error, "what is left of a map that was deleted is not gone yet");
+                    false
+                }
+            };
+            let gone: BTreeSet<Uuid> = due.into_iter().filter(removed).collect();
+            joined.catalog.forget(&gone).map_err(|error| error.to_string())?;
+            Ok(gone)
         });
         match cleared.await {
-            Ok(()) => self.deleted.retain(|uuid, _| !forgotten.contains(uuid)),
-            Err(error) => tracing::debug!(error, "what is left of maps that were deleted is not gone yet"),
+            Ok(gone) => self.deleted.retain(|uuid, _| !gone.contains(uuid)),
+            Err(error) => tracing::debug!(error, "maps that were deleted are not forgotten yet"),
         }
     }
 }
@@ -212,7 +220,7 @@ impl Keepers {
 /// Waits for what an operation wishes; where it does not come in time, the operation hears nothing.
 async fn fulfil(service: MapService, wish: Wish) {
     let until = Instant::now() + DONE_WITHIN;
-    while Instant::now() < until {
+    while Instant::now() < until && !wish.told.is_closed() {
         match is_fulfilled(&service, &wish).await {
             Ok(true) => {
                 _ = wish.told.send(());

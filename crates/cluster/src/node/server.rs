@@ -27,6 +27,9 @@ use crate::engine::ConnectError;
 use crate::forwarder::Forwarder;
 use crate::store::{ClusterStore, NoStore};
 
+/// How long NATS may tell a node nothing of the others before it counts as behind. An election of NATS takes some
+/// seconds, in which all nodes see nothing, and all go on answering.
+const SIGHT_LOST: Duration = Duration::from_secs(30);
 /// Pause before NATS is tried again.
 const CONNECT_AGAIN: Duration = Duration::from_secs(1);
 /// A node of the cluster: a server that shares its maps with others. It is made before the server's maps are opened,
@@ -166,10 +169,12 @@ impl Node {
         }
     }
 
-    /// True before it has joined the cluster, and where a copy is behind those of others, or lacking, for so long.
+    /// True before it has joined the cluster, where a copy is behind those of others, or lacking, for so long, and where
+    /// NATS has told nothing of the others for half a minute: then it cannot know.
     pub fn is_behind(&self, lag_max: Duration) -> bool {
         let since = *self.behind_since.lock();
-        self.view.borrow().beats == 0 || since.is_some_and(|since| since.elapsed() > lag_max)
+        let sees = self.view.borrow().seen.is_some_and(|seen| seen.elapsed() < SIGHT_LOST);
+        !sees || since.is_some_and(|since| since.elapsed() > lag_max)
     }
 
     /// Hands the maps that it leads over to others, waits until those have taken over, for some seconds at most, and

@@ -227,6 +227,33 @@ fn maps_are_made_and_deleted_on_all_nodes() {
     waited("it follows", || b.version("copy") == a.version("copy") && b.version("copy").unwrap().0 == 2);
 }
 
+/// What a server made by itself under the name of a map of the cluster is kept, is not taken for that map, and does not
+/// delete it.
+#[test]
+fn another_map_of_the_same_name_is_kept_under_another_name() {
+    let Some(nats) = NatsServers::start(1) else { return };
+    drop(nats.engine());
+    let folders: Vec<_> = (0..2).map(|_| TempDir::new().unwrap()).collect();
+    let runtime = Runtime::new().unwrap();
+    let data_dir = Some(folders[1].path().to_owned());
+    let alone = ServiceSettings { data_dir, ..ServiceSettings::default() };
+    let alone = MapService::open(alone, &OpeningProgress::default()).unwrap();
+    runtime.block_on(alone.create_map(name("hall"), MapSettings::new(0.5, 2))).unwrap();
+    drop(alone);
+    let a = Server::start(&nats, "a", folders[0].path());
+    assert!(a.create("hall"));
+    let led = leader(&[&a], "hall");
+    retried(|| led.insert("hall", 0));
+    let b = Server::start(&nats, "b", folders[1].path());
+    waited("the cluster's map there", || b.version("hall") == a.version("hall"));
+    assert_eq!(b.version("hall-replaced-0").map(|(revision, _)| revision), Some(0));
+    // What is none of the cluster's is deleted here alone, and what is, everywhere.
+    b.runtime.block_on(b.service.delete_map(&name("hall-replaced-0"))).unwrap();
+    assert!(a.version("hall").is_some() && b.version("hall-replaced-0").is_none());
+    b.runtime.block_on(b.service.delete_map(&name("hall"))).unwrap();
+    waited("it is deleted there too", || a.version("hall").is_none());
+}
+
 #[test]
 fn a_server_by_itself_or_another_node_does_not_open_the_folder_of_a_node() {
     let folder = TempDir::new().unwrap();

@@ -32,11 +32,14 @@ pub trait SharedCatalog: Debug + Send + Sync {
 
     /// True where a map that this node has no copy of is listed, and it has one now: another node has just made it.
     /// Asks NATS a few times a second at most, however many ask.
-    fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, bool>;
-
-    /// Takes a map out, for good: it is deleted on all nodes.
     ///
     /// # Errors
-    /// `MapNotFound` where there is none; `NoQuorum` and `OutcomeUnknown` as above.
-    fn delete<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<(), ServiceError>>;
+    /// `NoQuorum` where it is not known whether it is listed.
+    fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<bool, ServiceError>>;
+
+    /// Takes the map of this uuid out, for good: it is deleted on all nodes.
+    ///
+    /// # Errors
+    /// `MapNotFound` where it is not listed under this name; `NoQuorum` and `OutcomeUnknown` as above.
+    fn delete<'a>(&'a self, name: &'a MapName, uuid: Uuid) -> Later<'a, Result<(), ServiceError>>;
 }

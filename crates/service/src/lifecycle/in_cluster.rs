@@ -93,7 +93,7 @@ impl MapService {
     ) -> Result<MapVersion, ServiceError> {
         let map = self.map(name).await?;
         let version = map.version_now();
-        match cluster.catalog.delete(name).await {
+        match cluster.catalog.delete(name, map.uuid).await {
             // A map that was never taken into the cluster.
             Err(error) if error.reason == Reason::MapNotFound && map.lead() == Lead::NotJoined => {
                 self.drop_copy(name, map.uuid).await?;

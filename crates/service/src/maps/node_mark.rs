@@ -15,7 +15,7 @@ pub(super) fn check_node(data_dir: &DataDir, cluster: Option<&Cluster>) -> Resul
         (Some(cluster), Some(there)) if cluster.node.as_str() == there => return Ok(()),
         (Some(Cluster { node, .. }), Some(there)) => {
             format!(
-                "the data folder belongs to node {there}: start with cluster.node = {there:?}, not {node:?}"
+                "the data folder belongs to node {there}: start with cluster.node = {there:?}, not \"{node}\""
             )
         }
         (None, Some(there)) => format!(

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use parking_lot::Mutex;
 use tokio_stream::StreamExt;
+use uuid::Uuid;
 
 use crate::caller::{AllowedMaps, AllowedScans};
 use crate::cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, SharedCatalog};
@@ -218,11 +219,11 @@ impl SharedCatalog for NoCatalog {
         none()
     }
 
-    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, bool> {
-        Box::pin(std::future::ready(false))
+    fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
+        Box::pin(std::future::ready(Ok(false)))
     }
 
-    fn delete<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<(), ServiceError>> {
+    fn delete<'a>(&'a self, _: &'a MapName, _: Uuid) -> Later<'a, Result<(), ServiceError>> {
         none()
     }
 }

@@ -32,7 +32,9 @@ impl Worker {
             return Err(Stop::Diverged(how).refusal(&self.name));
         }
         let Some(member) = &mut self.member else { return Ok(()) };
-        if !member.is_named() {
+        // Also where the log names this node: another process of its name may have claimed, or this one before it was
+        // started again.
+        if !member.leads() {
             let claimed = member.claim_for_itself();
             self.settled(claimed)?;
         }
