@@ -26,7 +26,7 @@ pub(super) enum MapSource {
     /// Of a file.
     File(Box<Snapshot>),
     /// Of a server.
-    Server(Client, MapName),
+    Server(Box<Client>, MapName),
 }
 
 impl MapSourceOptions {
@@ -37,7 +37,7 @@ impl MapSourceOptions {
     pub(super) async fn open(&self) -> Result<MapSource, CliError> {
         match (&self.file, &self.name) {
             (Some(file), _) => Ok(MapSource::File(Box::new(Snapshot::read(&Disk::default(), file)?))),
-            (None, Some(name)) => Ok(MapSource::Server(self.server.connect().await?, name.clone())),
+            (None, Some(name)) => Ok(MapSource::Server(Box::new(self.server.connect().await?), name.clone())),
             (None, None) => Err(CliError::usage("a map file or --map is needed")),
         }
     }

@@ -29,8 +29,8 @@ EXAMPLES:
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
   mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
-  mrol serve --cluster nats://10.0.0.1:4222,nats://10.0.0.2:4222 --node n1 --http-listen 10.0.0.1:7333 \\
-      --grpc-listen 10.0.0.1:7334                share the maps with other nodes (docs/guide/cluster.md)
+  mrol serve --cluster nats://10.0.0.1:4222,nats://10.0.0.2:4222 --node n1
+                                                 share the maps with other nodes (docs/guide/cluster.md)
   mrol serve --leave-cluster                     take this data folder out of its cluster for good, and serve it alone
   MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable: limits.maps_max, with two underscores
 

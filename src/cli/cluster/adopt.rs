@@ -7,14 +7,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tokio::runtime::Runtime;
-use uuid::Uuid;
 
 use super::nats::{NatsOptions, engine_of};
 use mrol::console::parse;
 use mrol::console::{CliError, Output, bytes};
-use mrol_cluster::{ClusterStore, EnterError, Listing, NoStore, StreamError};
+use mrol_cluster::{ClusterStore, Listing, NoStore, StreamError};
 use mrol_map::map::MapName;
-use mrol_service::{MapService, NewMap, ServiceSettings};
+use mrol_service::{MapService, MapVersion, NewMap, ServiceError, ServiceSettings};
 use mrol_store::OpeningProgress;
 
 const EXAMPLES: &str = "\
@@ -50,16 +49,21 @@ impl Adopt {
         let of_service = ServiceSettings { data_dir: Some(data_dir.clone()), ..settings.service_settings() };
         let service = MapService::open(of_service, &OpeningProgress::default()).map_err(CliError::failed)?;
         let runtime = Runtime::new().map_err(CliError::failed)?;
-        let chosen = chosen(&service, &maps)?;
-        let uuids = chosen.into_iter().map(|name| Ok((uuid_of(&runtime, &service, &name)?, name)));
-        let uuids = uuids.collect::<Result<Vec<(Uuid, MapName)>, CliError>>()?;
+        let maps = chosen(&service, &maps)?.into_iter().map(|name| {
+            let version = runtime.block_on(service.version_of(&name)).map_err(CliError::failed)?;
+            Ok((name, version))
+        });
+        let maps = maps.collect::<Result<Vec<(MapName, MapVersion)>, CliError>>()?;
         let store = ClusterStore::create(&engine_of(&settings)).map_err(not_made)?;
         let (listing, _) = store.catalog.read().map_err(CliError::failed)?;
-        check_free(&listing, &uuids)?;
-        let output = output.with_bar_of(uuids.len(), "maps");
-        for (uuid, name) in uuids {
-            let is_there = listing.map(&name).is_some_and(|entry| entry.uuid == uuid);
-            output.print(&adopted(&runtime, &service, &store, name, is_there)?)?;
+        check_free(&listing, &maps)?;
+        let output = output.with_bar_of(maps.len(), "maps");
+        for (name, version) in maps {
+            let put = match listing.map(&name) {
+                Some(_) => None,
+                None => Some(entered(&store, &name, runtime.block_on(service.to_share(&name)))?),
+            };
+            output.print(&Adopted::of(&name, version, put))?;
             output.step();
         }
         output.clear_bar();
@@ -81,14 +85,9 @@ fn chosen(service: &MapService, named: &[MapName]) -> Result<Vec<MapName>, CliEr
     Ok(there.into_iter().filter(is_meant).collect())
 }
 
-fn uuid_of(runtime: &Runtime, service: &MapService, name: &MapName) -> Result<Uuid, CliError> {
-    let version = runtime.block_on(service.version_of(name)).map_err(CliError::failed)?;
-    Ok(version.map_uuid)
-}
-
 /// Refuses maps whose names others have in the cluster, before anything is put.
-fn check_free(listing: &Listing, maps: &[(Uuid, MapName)]) -> Result<(), CliError> {
-    for (uuid, name) in maps {
+fn check_free(listing: &Listing, maps: &[(MapName, MapVersion)]) -> Result<(), CliError> {
+    for (name, MapVersion { map_uuid: uuid, .. }) in maps {
         let Some(entry) = listing.map(name).filter(|entry| entry.uuid != *uuid) else { continue };
         return Err(CliError::failed(format!(
             "map {name} of the cluster is another one ({}, this is {uuid}); nothing was done. Start the server by itself once \
@@ -99,32 +98,22 @@ fn check_free(listing: &Listing, maps: &[(Uuid, MapName)]) -> Result<(), CliErro
     Ok(())
 }
 
-fn adopted(
-    runtime: &Runtime,
-    service: &MapService,
+/// Enters a map, and says how many bytes were put.
+fn entered(
     store: &ClusterStore,
-    name: MapName,
-    is_there: bool,
-) -> Result<Adopted, CliError> {
-    let NewMap { uuid, base, file } = runtime.block_on(service.to_share(&name)).map_err(CliError::failed)?;
-    let (revision, size) = (base.revision, file.len());
-    let map = name.to_string();
-    if !is_there {
-        let entered = store.enter(&name, &NewMap { uuid, base, file });
-        let there = entered.map_err(|error| not_entered(&name, &error))?;
-        if there != uuid {
-            return Err(CliError::failed(format!(
-                "map {name}: another of that name was entered meanwhile, {there}"
-            )));
-        }
+    name: &MapName,
+    new: Result<NewMap, ServiceError>,
+) -> Result<usize, CliError> {
+    let failed = |why: &dyn Display| {
+        CliError::failed(format!(
+            "map {name} was not entered: {why}. Those before it are in the cluster; the same command goes on with this one"
+        ))
+    };
+    let new = new.map_err(|error| failed(&error))?;
+    match store.enter(name, &new).map_err(|error| failed(&error))? {
+        there if there == new.uuid => Ok(new.file.len()),
+        other => Err(failed(&format!("another of that name was entered meanwhile, {other}"))),
     }
-    Ok(Adopted { map, map_uuid: uuid.to_string(), revision, bytes: size, was_there: is_there })
-}
-
-fn not_entered(name: &MapName, error: &EnterError) -> CliError {
-    CliError::failed(format!(
-        "map {name} was not entered: {error}. Those before it are in the cluster; the same command goes on with this one"
-    ))
 }
 
 fn not_made(error: NoStore) -> CliError {
@@ -152,18 +141,24 @@ struct Adopted {
     map: String,
     map_uuid: String,
     revision: u64,
-    bytes: usize,
-    /// True of a map that was in the cluster already.
-    was_there: bool,
+    /// Bytes that were put; none of a map that was in the cluster already.
+    bytes: Option<usize>,
+}
+
+impl Adopted {
+    fn of(name: &MapName, version: MapVersion, bytes: Option<usize>) -> Self {
+        let (map, map_uuid) = (name.to_string(), version.map_uuid.to_string());
+        Self { map, map_uuid, revision: version.revision, bytes }
+    }
 }
 
 impl Display for Adopted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { map, map_uuid, revision, was_there, .. } = self;
-        match was_there {
-            true => write!(f, "map {map} ({map_uuid}) is in the cluster already"),
-            false => {
-                let size = bytes(self.bytes);
+        let Self { map, map_uuid, revision, .. } = self;
+        match self.bytes {
+            None => write!(f, "map {map} ({map_uuid}) is in the cluster already"),
+            Some(size) => {
+                let size = bytes(size);
                 write!(
                     f,
                     "map {map} ({map_uuid}) is in the cluster now, at revision {revision}: {size} were put"

@@ -109,8 +109,20 @@ fn keep_file(file: &Bytes, map: &MapName, out: Option<PathBuf>) -> Result<(PathB
     let damaged = |reason| CliError::failed(format!("what the node sent of map {map} is no map: {reason}"));
     let snapshot = Snapshot::decode(file).map_err(damaged)?;
     let revision = snapshot.contents.revision;
-    let path = out.unwrap_or_else(|| format!("{map}-kept-{revision}.mrol").into());
-    let place = place_of_map_file(&path)?;
+    let place = match out {
+        Some(path) => place_of_map_file(&path)?,
+        None => {
+            let path = PathBuf::from(format!("{map}-kept-{revision}.mrol"));
+            // The copy of another node may be at the same revision.
+            if path.exists() && Snapshot::read(&Disk::default(), &path).ok().as_ref() != Some(&snapshot) {
+                let path = path.display();
+                return Err(CliError::failed(format!(
+                    "{path} is there and is another copy: name a file with --out"
+                )));
+            }
+            path
+        }
+    };
     snapshot.write(&Disk::default(), &place)?;
     Ok((place, revision))
 }

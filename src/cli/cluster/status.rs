@@ -221,7 +221,7 @@ mod tests {
         };
         let text = report.to_string();
         for part in [
-            "a     live    0.2.0    3.0 GiB",
+            "a     live    0.2.0    3.00 GiB",
             "b     SILENT",
             "hall  a       any     3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
             "yard  NONE    any     3      20        no copies",

@@ -253,7 +253,7 @@ mod tests {
         let newer = nodes(&[node("a", 5, roomy, false), node("b", 6, roomy, true)]);
         assert!(wrong(&newer)[0].contains("node b leads maps with records of version 6"), "{newer:?}");
         let full = nodes(&[node("a", 5, 1 << 20, true)]);
-        assert!(wrong(&full)[0].contains("a has 1.0 MiB left"), "{full:?}");
+        assert!(wrong(&full)[0].contains("a has 1.00 MiB left"), "{full:?}");
         let silent = nodes(&[SeenNode { is_live: false, ..node("a", 5, roomy, true) }]);
         assert!(wrong(&silent)[0].contains("a is silent"), "{silent:?}");
         assert!(wrong(&nodes(&[]))[0].contains("no node has ever beaten"));
