@@ -38,9 +38,9 @@ fn a_command_that_cannot_reach_nats_says_what_to_do() {
 #[test]
 fn input_that_makes_no_sense_is_named_with_its_limit() {
     for (call, parts) in [
-        (&["move", "office", "N 2"][..], &["<NODE>", "N 2", "[a-z0-9][a-z0-9_-]{0,63}"][..]),
+        (&["move", "office", "N 2"][..], &["NODE", "N 2", "[a-z0-9][a-z0-9_-]{0,63}"][..]),
         (&["move", "Office", "n2"], &["<MAP>", "Office"]),
-        (&["move", "office"], &["<NODE>"]),
+        (&["move", "office"], &["NODE"]),
         (&["move", "office", "n2", "--any"], &["--any"]),
         (&["move", "office", "n2", "--wait", "soon"], &["--wait", "soon", "90s"]),
         (&["keep", "n2", "office", "--out", "office.ply", "--nats", NOBODY], &["answered"]),
