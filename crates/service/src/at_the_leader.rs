@@ -130,7 +130,10 @@ impl MapService {
                         () = self.answered_no_more(map, &maker) => Err(not_answered(map, leader)),
                     };
                     match answer {
-                        Err(error) if leads_no_more(&error) => Some(error),
+                        // One that goes down may have begun with it.
+                        Err(error) if leads_no_more(&error) && error.reason != Reason::Draining => {
+                            Some(error)
+                        }
                         outcome => return outcome,
                     }
                 }

@@ -74,7 +74,7 @@ impl Heart {
             // Of a server that lags, unless somebody else beats under this name.
             let there = read.iter().find(|beat| beat.node == self.settings.name);
             return match there.filter(|there| there.beat.grpc != own.grpc) {
-                Some(twin) => Err(format!("another process, at {}, beats as this node", twin.beat.grpc)),
+                Some(other) => Err(format!("another process, at {}, beats as this node", other.beat.grpc)),
                 None => Ok(()),
             };
         }

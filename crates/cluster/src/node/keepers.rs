@@ -188,7 +188,8 @@ impl Keepers {
     async fn forget_deleted(&mut self) {
         let view = self.view.borrow().clone();
         let is_held = |uuid: &Uuid| view.others.values().any(|seen| seen.beat.maps.contains_key(uuid));
-        // A node that is gone may come back with a copy that its last beat did not have yet. One of the nodes is enough.
+        // A node that is gone may come back with a copy that its last beat did not have yet. One of the nodes is
+        // enough.
         let is_first = view.others.iter().all(|(node, seen)| seen.is_live && *node > self.node);
         let due = |(uuid, since): (&Uuid, &Instant)| {
             (is_first && since.elapsed() > DELETED_FOR && !is_held(uuid)).then_some(*uuid)

@@ -169,8 +169,8 @@ impl Node {
         }
     }
 
-    /// True before it has joined the cluster, where a copy is behind those of others, or lacking, for so long, and where
-    /// NATS has told nothing of the others for half a minute: then it cannot know.
+    /// True before it has joined the cluster, where a copy is behind those of others, or lacking, for so long, and
+    /// where NATS has told nothing of the others for half a minute: then it cannot know.
     pub fn is_behind(&self, lag_max: Duration) -> bool {
         let since = *self.behind_since.lock();
         let sees = self.view.borrow().seen.is_some_and(|seen| seen.elapsed() < SIGHT_LOST);

@@ -24,9 +24,9 @@ pub struct LeftMap {
 }
 
 impl DataDir {
-    /// Takes the folder out of its cluster for good, and says which node's it was; none where it belongs to no node, and
-    /// nothing is done. Every map gets a uuid of its own: from now on its history is another than that of the cluster.
-    /// Voxels, revisions, trajectories and keep-outs stay; undo does not reach behind.
+    /// Takes the folder out of its cluster for good, and says which node's it was; none where it belongs to no node,
+    /// and nothing is done. Every map gets a uuid of its own: from now on its history is another than that of the
+    /// cluster. Voxels, revisions, trajectories and keep-outs stay; undo does not reach behind.
     ///
     /// After a crash at any moment each map is there once, under one of the two uuids, and the folder still belongs to
     /// the node: it is to be called again, and gives all maps new uuids. `left` is called with each map.
