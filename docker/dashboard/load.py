@@ -117,22 +117,35 @@ def node_of_a_cluster(binary, nats_program, server):
         processes.append(process)
         ask = asking_of(server.connection(address), server.keys["operator"])
         deadline = time.monotonic() + 30
-        while ask("GET", "/readyz")[0] != 200:
-            if time.monotonic() > deadline:
-                sys.exit(f"the node does not join:\n{(folder / 'node.log').read_text()}")
-            time.sleep(0.2)
+        scan = _body("mower", [[1.0, 2.0, 0.5]], (0.0, 0.0)) | {"align": False}
         for method, path, body in [
+            ("GET", "/readyz", None),
             ("PUT", "/v1/maps/yard", {"resolution_m": 0.2}),
-            ("POST", "/v1/maps/yard/scans", _body("mower", [[1.0, 2.0, 0.5]], (0.0, 0.0)) | {"align": False}),
+            ("POST", "/v1/maps/yard/scans", scan),
         ]:
-            status, text = ask(method, path, body)
-            if status not in (200, 201):
-                sys.exit(f"{method} {path} of the node: {status} {text}")
+            # A NATS server that has just begun refuses for a while.
+            while (answer := ask(method, path, body))[0] not in (200, 201):
+                if answer[0] != 503 or time.monotonic() > deadline:
+                    sys.exit(f"{method} {path} of the node: {answer}\n{(folder / 'node.log').read_text()}")
+                time.sleep(0.2)
+        stopped = threading.Event()
+        mower = threading.Thread(target=scan_until, args=(stopped, ask, scan), daemon=True)
+        mower.start()
         yield address
+        stopped.set()
+        mower.join(60)
     finally:
         for process in reversed(processes):
             process.terminate()
             process.wait()
+
+
+def scan_until(stopped, ask, scan):
+    """Sends a scan to the node every second, so that NATS has something to acknowledge."""
+    while not stopped.wait(1):
+        status, text = ask("POST", "/v1/maps/yard/scans", scan)
+        if status != 200:
+            print(f"the node refused a scan: {status} {text}")
 
 
 def asking_of(connection, secret):
