@@ -1,8 +1,8 @@
 //! How a server goes down: what is in hand is finished within a bound, and nothing new begins.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tokio_util::task::task_tracker::TaskTrackerToken;
@@ -22,7 +22,7 @@ pub struct Lifecycle {
     draining: CancellationToken,
     cut: CancellationToken,
     /// True while a node of a cluster is behind the others.
-    is_behind: Arc<AtomicBool>,
+    is_behind: Arc<watch::Sender<bool>>,
     in_flight: TaskTracker,
 }
 
@@ -40,12 +40,17 @@ impl Lifecycle {
     /// True of a node of a cluster that has not joined it, or is too far behind the others: it serves, and whoever can
     /// is to ask another.
     pub fn is_behind(&self) -> bool {
-        self.is_behind.load(Ordering::Relaxed)
+        *self.is_behind.borrow()
     }
 
     /// Says whether it is.
     pub fn set_behind(&self, is_behind: bool) {
-        self.is_behind.store(is_behind, Ordering::Relaxed);
+        self.is_behind.send_if_modified(|was| std::mem::replace(was, is_behind) != is_behind);
+    }
+
+    /// Whether it is, as it changes.
+    pub fn behind(&self) -> watch::Receiver<bool> {
+        self.is_behind.subscribe()
     }
 
     /// True once new requests are refused.

@@ -19,7 +19,8 @@ EXAMPLES:
   mrol health --server http://10.0.0.5:7334 && echo ready
 
 Asks by gRPC's health protocol, as load balancers do, without a key. The exit code is 0 where the server serves, and 1 where it
-drains, cannot be reached or does not answer within two seconds: made for a container's health check.";
+starts, drains, is a node that is behind the others, cannot be reached or does not answer within two seconds: made for a
+container's health check.";
 
 /// Ask whether a server is ready; the exit code is the answer
 #[derive(Debug, clap::Args)]
@@ -31,6 +32,9 @@ pub(super) struct Health {
 
 /// Longest time to wait for the answer.
 const PATIENCE: Duration = Duration::from_secs(2);
+
+const NOT_SERVING: &str = "the server is not ready: it opens its maps, goes down, or is a node that is behind the others (its \
+                           /readyz says which)";
 
 #[derive(Debug, Serialize)]
 struct Serving {
@@ -48,7 +52,7 @@ impl Health {
         let serving = tokio::time::timeout(PATIENCE, is_serving(&self.server)).await;
         let serving = serving.map_err(|_| CliError::failed(format!("no answer within {PATIENCE:?}")))??;
         output.print(&Serving { serving })?;
-        if serving { Ok(()) } else { Err(CliError::failed("the server is going down")) }
+        if serving { Ok(()) } else { Err(CliError::failed(NOT_SERVING)) }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Section `cluster` of the settings.
 
+#[cfg(any(feature = "cluster", test))]
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -91,6 +92,7 @@ impl ClusterConfig {
 ///
 /// # Errors
 /// Where it listens at all addresses of the machine, of which none is known to be the right one.
+#[cfg(any(feature = "cluster", test))]
 pub(crate) fn advertised(
     key: &'static str,
     set: Option<&String>,

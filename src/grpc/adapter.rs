@@ -91,17 +91,9 @@ impl Health {
     const SERVICES: [&str; 4] =
         ["", occupancy_server::SERVICE_NAME, mapping_server::SERVICE_NAME, maps_server::SERVICE_NAME];
 
-    /// From now on it serves.
-    pub async fn set_serving(&self) {
-        self.set(ServingStatus::Serving).await;
-    }
-
-    /// From now on it does not.
-    pub async fn set_not_serving(&self) {
-        self.set(ServingStatus::NotServing).await;
-    }
-
-    async fn set(&self, status: ServingStatus) {
+    /// Says whether it serves.
+    pub async fn set(&self, is_serving: bool) {
+        let status = if is_serving { ServingStatus::Serving } else { ServingStatus::NotServing };
         for service in Self::SERVICES {
             self.0.set_service_status(service, status).await;
         }

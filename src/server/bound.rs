@@ -224,8 +224,8 @@ impl Server {
                 return Ok(());
             }
         }
-        let mut opening = Opening::begin(service.clone(), wanted, health).await;
         membership.begin(&service, &lifecycle);
+        let mut opening = Opening::begin(service.clone(), wanted, health, &lifecycle).await;
         tracing::info!(http = %http_tcp.address, grpc = %grpc_tcp.address, "serving");
         let admin_sockets = admin_tcp.map(|tcp| (&admin, tcp, None));
         let sockets = [(&grpc, grpc_tcp, grpc_unix), (&http, http_tcp, http_unix)];

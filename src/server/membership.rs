@@ -89,6 +89,7 @@ impl Membership {
         let Some(Member { node, lag_max }) = self.0.clone() else { return };
         node.begin(service.clone());
         let lifecycle = lifecycle.clone();
+        lifecycle.set_behind(true);
         tokio::spawn(async move {
             let mut due = interval(LOOKED_EVERY);
             while !lifecycle.is_draining() {

@@ -113,9 +113,22 @@ mod tests {
             acknowledgments,
             ..NodeReading::default()
         };
-        let led = Lead::Shared { leader: NodeName::new("n1").ok(), is_here: true, epoch: 4, sequence: 12 };
-        let followed =
-            Lead::Shared { leader: NodeName::new("n2").ok(), is_here: false, epoch: 2, sequence: 7 };
+        let led = Lead::Shared {
+            leader: NodeName::new("n1").ok(),
+            is_here: true,
+            has_claimed: true,
+            epoch: 4,
+            claim: None,
+            sequence: 12,
+        };
+        let followed = Lead::Shared {
+            leader: NodeName::new("n2").ok(),
+            is_here: false,
+            has_claimed: false,
+            epoch: 2,
+            claim: None,
+            sequence: 7,
+        };
         let maps = [
             shared("hall", 1, 12, led),
             SharedMap { has_diverged: true, ..shared("yard", 2, 30, followed) },

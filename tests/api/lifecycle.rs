@@ -361,3 +361,23 @@ async fn before_it_drains_it_says_that_it_is_not_ready_and_serves_on() {
     stopping.stopped().await;
     TcpStream::connect(grpc).await.expect_err("no listener");
 }
+
+#[cfg(feature = "cluster")]
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_that_has_not_joined_its_cluster_says_by_both_protocols_that_it_is_not_ready() {
+    let folder = tempfile::tempdir().unwrap();
+    // Nothing listens there.
+    let options = ["--cluster", "nats://127.0.0.1:1", "--node", "n1"];
+    let server = Process::start(folder.path().to_str().unwrap(), &options);
+    let ready = client().get(format!("{}/readyz", server.http)).send().await.unwrap();
+    assert_eq!(ready.status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(json_of(ready).await, json!({"ready": false, "reason": "behind"}));
+    let channel =
+        tonic::transport::Endpoint::from_shared(server.grpc.clone()).unwrap().connect().await.unwrap();
+    let mut health = HealthClient::new(channel);
+    assert_eq!(health.check(HealthCheckRequest::default()).await.unwrap().into_inner().status, 2);
+    // It lives, and answers.
+    let live = client().get(format!("{}/livez", server.http)).send().await.unwrap();
+    assert_eq!(live.status(), StatusCode::OK);
+    assert_eq!(server.stop(), Some(0));
+}

@@ -1,10 +1,10 @@
 //! Those who write to the map of a site and read it, whatever happens to its nodes.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use mrol::client::Client;
+use mrol::client::{Client, ClientError};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{Lookup, MapName, RobotName};
 use mrol::mapping::Guess;
@@ -32,8 +32,8 @@ pub(crate) struct Load {
 pub(crate) struct Reads {
     /// How long answers took.
     took: Mutex<Vec<Duration>>,
-    /// Questions that failed while the node was said to be up.
-    failed: AtomicU64,
+    /// What was said to questions that failed while the node was said to be up.
+    failed: Mutex<Vec<String>>,
     is_up: AtomicBool,
 }
 
@@ -101,13 +101,13 @@ impl Load {
 }
 
 impl Reads {
-    /// Questions that failed while the node was said to be up, how many were answered, and the 99th percentile of how
-    /// long those took.
-    pub(crate) fn summary(&self) -> (u64, usize, Duration) {
+    /// What was said to questions that failed while the node was said to be up, how many were answered, and the 99th
+    /// percentile of how long those took.
+    pub(crate) fn summary(&self) -> (Vec<String>, usize, Duration) {
         let mut took = self.took.lock().unwrap().clone();
         took.sort();
         let slow = took.get(took.len() * 99 / 100).copied().unwrap_or_default();
-        (self.failed.load(Ordering::Acquire), took.len(), slow)
+        (self.failed.lock().unwrap().clone(), took.len(), slow)
     }
 }
 
@@ -153,42 +153,48 @@ async fn write(
 
 /// Asks one node about a point, again and again. What it answers never goes back.
 async fn read(grpc: String, map: MapName, is_over: Arc<AtomicBool>, reads: Arc<Reads>) {
+    let began = Instant::now();
     let mut revision = 0;
     let mut client = None;
     while !is_over.load(Ordering::Acquire) {
         tokio::time::sleep(Duration::from_millis(5)).await;
-        if client.is_none() {
-            client = Client::connect(&grpc).await.ok();
-        }
+        // What was begun while it was killed may fail after it is said to be up.
+        let was_up = reads.is_up.load(Ordering::Acquire);
         let begun = Instant::now();
-        let query = PointQuery {
-            points: vec![Point::new(0.25, 0.25, 0.25)].into(),
-            map_from_points: None,
-            level: 0,
-            lookup: Lookup::Exact,
-            min_revision: None,
-            map_uuid: None,
-            keep_out: false,
-        };
-        let answer = match &client {
-            Some(client) => client.query_points(&map, query).await.ok(),
-            None => None,
-        };
-        match answer {
-            Some(answer) => {
-                assert!(answer.version.revision >= revision, "a node went back");
-                revision = answer.version.revision;
+        match ask(&mut client, &grpc, &map).await {
+            Ok(answered) => {
+                assert!(answered >= revision, "a node went back");
+                revision = answered;
                 reads.took.lock().unwrap().push(begun.elapsed());
             }
             // It may have been killed while it was asked.
-            None if reads.is_up.load(Ordering::Acquire) => {
-                reads.failed.fetch_add(1, Ordering::AcqRel);
+            Err(error) if was_up && reads.is_up.load(Ordering::Acquire) => {
+                let said = format!("at {:.3} s: {error}", began.elapsed().as_secs_f64());
+                reads.failed.lock().unwrap().push(said);
             }
-            None => {}
+            Err(_) => {}
         }
         if !reads.is_up.load(Ordering::Acquire) {
             // It may begin anew from an older copy.
             (client, revision) = (None, 0);
         }
     }
+}
+
+/// Asks a node about a point: the revision that its answer names.
+async fn ask(client: &mut Option<Client>, grpc: &str, map: &MapName) -> Result<u64, ClientError> {
+    let client = match client {
+        Some(client) => client,
+        None => client.insert(Client::connect(grpc).await?),
+    };
+    let query = PointQuery {
+        points: vec![Point::new(0.25, 0.25, 0.25)].into(),
+        map_from_points: None,
+        level: 0,
+        lookup: Lookup::Exact,
+        min_revision: None,
+        map_uuid: None,
+        keep_out: false,
+    };
+    Ok(client.query_points(map, query).await?.version.revision)
 }

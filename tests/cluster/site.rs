@@ -79,10 +79,33 @@ impl Site {
             .args(["--cluster", &urls.join(","), "--node", &format!("n{index}")])
             .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()))
             .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
+            // A small disk is to be filled.
+            .env("MROL_LIMITS__DISK_FREE_LOW_MIB", "4")
+            .env("MROL_LIMITS__DISK_FREE_RESUME_MIB", "8")
             .stdout(Stdio::null())
             .stderr(log);
         node.from_others.open();
         node.process = Some(command.spawn().unwrap());
+    }
+
+    /// Starts a server by itself, whose data folder is beside those of the nodes.
+    pub(crate) fn start_alone(&self) -> Alone {
+        let [http, grpc] = free_ports();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+        command
+            .args(["serve", "--log-level", "warn", "--data-dir"])
+            .arg(self.folder.path().join("alone"))
+            .args(["--http-listen", &format!("127.0.0.1:{http}")])
+            .args(["--grpc-listen", &format!("127.0.0.1:{grpc}")])
+            .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
+            .env("MROL_LOG__AUDIT", "false")
+            .stdout(Stdio::null());
+        Alone { process: command.spawn().unwrap(), grpc: format!("http://127.0.0.1:{grpc}") }
+    }
+
+    /// The process of a node that runs.
+    pub(crate) fn process(&self, index: usize) -> u32 {
+        self.nodes[index].process.as_ref().unwrap().id()
     }
 
     /// Kills a node with -9.
@@ -222,6 +245,25 @@ impl Drop for Site {
             (0..NODES).for_each(|node| eprintln!("--- node {node}\n{}", self.log_of(node)));
         }
         (0..NODES).for_each(|node| self.kill_node(node));
+    }
+}
+
+/// A server by itself, until it is dropped.
+pub(crate) struct Alone {
+    process: Child,
+    pub(crate) grpc: String,
+}
+
+impl Alone {
+    pub(crate) fn id(&self) -> u32 {
+        self.process.id()
+    }
+}
+
+impl Drop for Alone {
+    fn drop(&mut self) {
+        _ = self.process.kill();
+        _ = self.process.wait();
     }
 }
 

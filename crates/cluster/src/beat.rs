@@ -21,6 +21,9 @@ pub struct Beat {
     pub maps: BTreeMap<Uuid, MapHead>,
     /// Bytes that its disk has left.
     pub free_bytes: u64,
+    /// True of the last beat of a node that was told to end: nobody waits for it.
+    #[serde(default)]
+    pub has_ended: bool,
 }
 
 /// How far a node's copy of a map is.
@@ -30,6 +33,9 @@ pub struct MapHead {
     pub revision: u64,
     /// How many claims of its log the node has read.
     pub epoch: u64,
+    /// The id of the last claim that it has read, where it has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub claim: Option<Uuid>,
     /// Number of the last message of its log that the node has read.
     #[serde(default)]
     pub sequence: u64,
@@ -50,7 +56,14 @@ mod tests {
     fn a_beat_is_read_as_it_was_written_and_by_versions_that_know_less() {
         let maps = BTreeMap::from([(
             Uuid::from_u128(7),
-            MapHead { revision: 12, epoch: 3, sequence: 14, leads: true, is_parted: false },
+            MapHead {
+                revision: 12,
+                epoch: 3,
+                claim: Some(Uuid::nil()),
+                sequence: 14,
+                leads: true,
+                is_parted: false,
+            },
         )]);
         let beat = Beat {
             http: "http://a:7333".to_owned(),
@@ -59,6 +72,7 @@ mod tests {
             record_version: 5,
             maps,
             free_bytes: 1 << 40,
+            has_ended: false,
         };
         let text = serde_json::to_string(&beat).unwrap();
         assert_eq!(serde_json::from_str::<Beat>(&text).unwrap(), beat);

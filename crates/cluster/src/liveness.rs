@@ -47,6 +47,11 @@ impl Liveness {
         self.acknowledged = Some(revision);
     }
 
+    /// A beat of one's own between two of those was acknowledged, which measures no silence.
+    pub fn beat_between_acknowledged(&mut self, revision: u64) {
+        self.acknowledged = Some(revision);
+    }
+
     /// All beats were read: the revision of each node's last. False, and nothing is made of it, where one's own last is
     /// not among them: what was read is older, and says nothing about the silence of others.
     pub fn beats_read(&mut self, revisions: &BTreeMap<NodeName, u64>) -> bool {

@@ -170,10 +170,11 @@ mod tests {
             record_version: 0,
             maps: BTreeMap::new(),
             free_bytes: 0,
+            has_ended: false,
         };
         let node = |name: &str| NodeName::new(name).unwrap();
         let copy = |&(name, is_live, revision, leads, is_parted): &(&str, bool, Option<u64>, bool, bool)| {
-            let head = MapHead { revision: revision?, epoch: 1, sequence: 0, leads, is_parted };
+            let head = MapHead { revision: revision?, epoch: 1, claim: None, sequence: 0, leads, is_parted };
             Some(MapCopy { node: node(name), is_live, head })
         };
         let copies = nodes.iter().filter_map(copy).collect();

@@ -15,7 +15,7 @@ EXAMPLES:
   mrol cluster status --nats nats://10.0.0.1:4222
   mrol cluster status --config mrol.toml --json | jq '.maps[] | select(.leader == null)'
 
-Each node beats every two seconds. One that does not for three is shown as silent. A copy that has parted has another history
+Each node beats every two seconds. One that does not for three is shown as silent; one that was told to end says so. A copy that has parted has another history
 than the map's log: it takes no changes (`mrol cluster keep --help`).";
 
 /// Show the nodes, the maps, who leads them, and which copies are behind
@@ -43,6 +43,8 @@ struct Report {
 struct NodeRow {
     node: String,
     live: bool,
+    /// It was told to end, and said so.
+    ended: bool,
     version: String,
     record_version: u32,
     http: String,
@@ -80,7 +82,9 @@ impl Report {
 
     /// What somebody should look at.
     fn warnings(&self) -> Vec<String> {
-        let silent = self.nodes.iter().filter(|node| !node.live).map(|node| {
+        let none = "no node has ever beaten: start one with `mrol serve --cluster`".to_owned();
+        let none = self.nodes.is_empty().then_some(none);
+        let silent = self.nodes.iter().filter(|node| !node.live && !node.ended).map(|node| {
             let seconds = OverviewReader::SILENT_AFTER.as_secs();
             format!("node {} is SILENT: no beat within {seconds} s", node.node)
         });
@@ -98,7 +102,7 @@ impl Report {
             });
             unled.into_iter().chain(parted)
         });
-        silent.chain(maps).collect()
+        none.into_iter().chain(silent).chain(maps).collect()
     }
 }
 
@@ -107,6 +111,7 @@ impl NodeRow {
         Self {
             node: node.to_string(),
             live: *is_live,
+            ended: beat.has_ended,
             version: beat.version.clone(),
             record_version: beat.record_version,
             http: beat.http.clone(),
@@ -116,7 +121,11 @@ impl NodeRow {
     }
 
     fn cells(&self) -> Vec<String> {
-        let state = if self.live { "live" } else { "SILENT" };
+        let state = match (self.live, self.ended) {
+            (true, _) => "live",
+            (false, true) => "ended",
+            (false, false) => "SILENT",
+        };
         let free = self.free_bytes.map_or("?".to_owned(), |free| bytes(free as usize));
         cells([&self.node, state, &self.version, &free, &self.grpc, &self.http])
     }
@@ -196,6 +205,7 @@ mod tests {
         let node = |node: &str, live| NodeRow {
             node: node.into(),
             live,
+            ended: node == "d",
             version: "0.2.0".into(),
             record_version: 5,
             http: "http://a:7333".into(),
@@ -213,7 +223,7 @@ mod tests {
         };
         let parted = CopyRow { parted: true, live: false, ..copy("c", 25, 0) };
         let report = Report {
-            nodes: vec![node("a", true), node("b", false)],
+            nodes: vec![node("a", true), node("b", false), node("d", false)],
             maps: vec![
                 map("hall", Some("a"), vec![copy("a", 20, 0), copy("b", 18, 2), parted]),
                 map("yard", None, Vec::new()),
@@ -223,6 +233,7 @@ mod tests {
         for part in [
             "a     live    0.2.0    3.00 GiB",
             "b     SILENT",
+            "d     ended",
             "hall  a       any     3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
             "yard  NONE    any     3      20        no copies",
             "node b is SILENT: no beat within 3 s",
@@ -231,6 +242,11 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
+        let nobody = Report { nodes: Vec::new(), maps: Vec::new() }.to_string();
+        assert!(
+            nobody.contains("no node has ever beaten: start one with `mrol serve --cluster`"),
+            "{nobody}"
+        );
         let json = serde_json::to_value(&report).unwrap();
         assert_eq!(
             (&json["maps"][0]["copies"][1]["lag"], &json["maps"][1]["leader"]),

@@ -17,7 +17,7 @@ use mrol::map::{CallerName, MapName, MapSettings};
 use mrol::middleware::Middleware;
 use mrol::service::replication::NodeName;
 use mrol::service::{
-    Cluster, Later, Limits, MapService, NewMap, Reason, ServiceError, ServiceSettings, SharedCatalog,
+    Cluster, Later, Lead, Limits, MapService, NewMap, Reason, ServiceError, ServiceSettings, SharedCatalog,
 };
 use mrol::store::OpeningProgress;
 use mrol::telemetry::{Audit, Metrics, RequestRecorder};
@@ -72,7 +72,8 @@ impl Nodes {
         for node in [&a, &b] {
             node.service.share_map(&map, Arc::new(log.clone()), node.name.clone()).await.unwrap();
         }
-        a.service.lead_map(&map, Vec::new()).await.unwrap();
+        a.service.claim_map(&map, None).await.unwrap();
+        a.service.open_map(&map, claim_of(&a.service, &map).await, Vec::new()).await.unwrap();
         b.service.follow_map(&map, None).await.unwrap();
         Self { a, b, map }
     }
@@ -81,7 +82,12 @@ impl Nodes {
     pub(super) async fn hand_over(&self) {
         self.a.service.hand_map_over(&self.map, self.b.name.clone()).await.unwrap();
         self.b.service.follow_map(&self.map, None).await.unwrap();
-        self.b.service.lead_map(&self.map, Vec::new()).await.unwrap();
+        self.b.service.claim_map(&self.map, None).await.unwrap();
+        self.b
+            .service
+            .open_map(&self.map, claim_of(&self.b.service, &self.map).await, Vec::new())
+            .await
+            .unwrap();
     }
 }
 
@@ -165,4 +171,12 @@ impl SharedCatalog for NoCatalog {
 
 fn none<'a, A: Send + 'a>() -> Later<'a, Result<A, ServiceError>> {
     Box::pin(std::future::ready(Err(ServiceError::new(Reason::NoQuorum, "there is no catalog here"))))
+}
+
+/// The last claim of a map that a node has read.
+async fn claim_of(service: &MapService, map: &MapName) -> Option<Uuid> {
+    match &*service.lead_of(map).await.unwrap().borrow() {
+        Lead::Shared { claim, .. } => *claim,
+        _ => None,
+    }
 }

@@ -5,6 +5,7 @@ use mrol_service::replication::NodeName;
 use uuid::Uuid;
 
 use super::view::View;
+use crate::beat::MapHead;
 
 /// Beats for which a node that does not lead what it should is waited for: it may be starting, or another may be better
 /// placed.
@@ -15,8 +16,10 @@ const PATIENCE: u64 = 4;
 pub(super) enum Choice {
     /// Nothing.
     Stay,
-    /// It takes over.
+    /// It claims to lead.
     Claim,
+    /// It takes over by its claim of this id.
+    Open(Option<Uuid>),
     /// It gives the lead to another.
     HandOver(NodeName),
 }
@@ -40,6 +43,8 @@ pub(super) struct Known<'a> {
     pub(super) view: &'a View,
     /// Its own beats since it has seen no node lead the map.
     pub(super) waited: u64,
+    /// A revision of the beats' bucket after its last claim of the map, once there is one.
+    pub(super) claimed_at: Option<u64>,
     /// Version of the records that it writes.
     pub(super) record_version: u32,
 }
@@ -54,6 +59,11 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
                 None => Choice::Stay,
             }
         }
+        Lead::Shared { has_claimed: true, claim, .. } => match furthest(known) {
+            Some(node) => Choice::HandOver(node.clone()),
+            None if all_have_heard(known, *claim) => Choice::Open(*claim),
+            None => Choice::Stay,
+        },
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
         // What it would write, not all could read: nodes are exchanged one by one.
         Lead::Shared { .. } if known.view.reads_least() < known.record_version => Choice::Stay,
@@ -84,6 +94,23 @@ fn is_first(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
     }
 }
 
+/// The live node that is furthest, where that is further than this one.
+fn furthest<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
+    let further = known.view.holders(known.map).filter(|(_, head)| head.revision > known.revision);
+    further.max_by_key(|(_, head)| head.revision).map(|(node, _)| node)
+}
+
+/// True where every other live node has said how far it is since this one made its `claim`: it had read it, or beat later
+/// than this node after the claim. What it said before is no measure: the log may have lost its newest messages since. Nor
+/// is it that it said nothing of the map: it may have taken its copy since.
+fn all_have_heard(known: &Known<'_>, claim: Option<Uuid>) -> bool {
+    known.view.others.values().filter(|seen| seen.is_live).all(|seen| {
+        let head = seen.beat.maps.get(&known.map);
+        let has_read = |head: &MapHead| head.is_parted || (claim.is_some() && head.claim == claim);
+        head.is_some_and(has_read) || known.claimed_at.is_some_and(|claimed| seen.revision > claimed)
+    })
+}
+
 /// True of another node that has read what this one had a beat ago.
 fn can_take_over(known: &Known<'_>, node: &NodeName) -> bool {
     let mut holders = known.view.holders(known.map);
@@ -95,7 +122,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::beat::{Beat, MapHead};
+    use crate::beat::Beat;
     use crate::node::view::Seen;
 
     const MAP: Uuid = Uuid::from_u128(1);
@@ -108,7 +135,14 @@ mod tests {
     fn view(others: &[(&str, bool, Option<u64>, bool)]) -> View {
         let seen = |&(name, is_live, revision, is_parted): &(&str, bool, Option<u64>, bool)| {
             let head = |revision| {
-                let head = MapHead { revision, epoch: 1, sequence: revision, leads: !is_parted, is_parted };
+                let head = MapHead {
+                    revision,
+                    epoch: 1,
+                    claim: Some(Uuid::from_u128(1)),
+                    sequence: revision,
+                    leads: !is_parted,
+                    is_parted,
+                };
                 (MAP, head)
             };
             let beat = Beat {
@@ -118,15 +152,23 @@ mod tests {
                 record_version: 7,
                 maps: revision.map(head).into_iter().collect(),
                 free_bytes: 0,
+                has_ended: false,
             };
-            (node(name), Seen { beat, is_live })
+            (node(name), Seen { beat, revision: 20, is_live })
         };
         let others = others.iter().map(seen).collect::<BTreeMap<_, _>>();
         View { beats: 10, others, ..View::default() }
     }
 
     fn led_by(leader: Option<&str>, is_here: bool) -> Lead {
-        Lead::Shared { leader: leader.map(node), is_here, epoch: 1, sequence: 5 }
+        Lead::Shared {
+            leader: leader.map(node),
+            is_here,
+            has_claimed: is_here,
+            epoch: 1,
+            claim: None,
+            sequence: 5,
+        }
     }
 
     /// What `b` at revision 5 does.
@@ -147,6 +189,7 @@ mod tests {
             wished,
             view,
             waited,
+            claimed_at: None,
             record_version: 7,
         };
         choose(&known)
@@ -198,6 +241,7 @@ mod tests {
             wished: None,
             view: &view,
             waited: PATIENCE,
+            claimed_at: None,
             record_version,
         };
         assert_eq!(choose(&known(7)), Choice::Claim);
@@ -209,6 +253,59 @@ mod tests {
         let lead = led_by(Some("b"), false);
         assert_eq!(chosen(&lead, &[("a", true, Some(5), false)], 0, Some("a")), Choice::Claim);
         assert_eq!(chosen(&lead, &[("a", true, Some(7), false)], 0, None), Choice::Stay);
+    }
+
+    #[test]
+    fn what_was_claimed_is_opened_once_all_have_said_how_far_they_are_since() {
+        let own = node("b");
+        let lead = |claim| Lead::Shared {
+            leader: Some(own.clone()),
+            is_here: false,
+            has_claimed: true,
+            epoch: 1,
+            claim: Some(Uuid::from_u128(claim)),
+            sequence: 5,
+        };
+        let then = |claim, claimed_at, others: &[(&str, bool, Option<u64>, bool)]| {
+            let (lead, view) = (lead(claim), view(others));
+            let known = Known {
+                own: &own,
+                map: MAP,
+                revision: 5,
+                sequence_before: 5,
+                lead: &lead,
+                wished: None,
+                view: &view,
+                waited: 0,
+                claimed_at,
+                record_version: 7,
+            };
+            choose(&known)
+        };
+        // All beats here are of nodes that have read claim 1, and have revision 20 of the bucket.
+        let [behind, equal, further] = [4, 5, 6].map(|revision| ("a", true, Some(revision), false));
+        assert_eq!(then(1, None, &[behind]), Choice::Open(Some(Uuid::from_u128(1))));
+        assert_eq!(then(2, None, &[equal]), Choice::Stay, "it has not read the claim");
+        assert_eq!(then(2, Some(20), &[equal]), Choice::Stay, "its beat is older");
+        assert_eq!(
+            then(2, Some(19), &[equal]),
+            Choice::Open(Some(Uuid::from_u128(2))),
+            "it does not follow, and beat since"
+        );
+        let copying = ("c", true, None, false);
+        assert_eq!(then(1, None, &[equal, copying]), Choice::Stay, "c may have a copy by now");
+        assert_eq!(then(1, Some(19), &[equal, copying]), Choice::Open(Some(Uuid::from_u128(1))));
+        assert_eq!(
+            then(2, None, &[("a", false, Some(5), false)]),
+            Choice::Open(Some(Uuid::from_u128(2))),
+            "a is gone"
+        );
+        assert_eq!(
+            then(2, None, &[("a", true, Some(9), true)]),
+            Choice::Open(Some(Uuid::from_u128(2))),
+            "a has parted"
+        );
+        assert_eq!(then(2, None, &[further]), Choice::HandOver(node("a")));
     }
 
     #[test]

@@ -13,6 +13,7 @@ use parking_lot::Mutex;
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::lag::Lag;
 use super::settings::NodeSettings;
 use super::view::{Seen, View};
 use crate::beat::{Beat, MapHead};
@@ -23,6 +24,17 @@ use crate::store::ClusterStore;
 
 /// How long a port of a silent node may take to answer.
 const PORT_WITHIN: Duration = Duration::from_millis(200);
+/// Least time between two beats that are asked for.
+const ASKED_EVERY: Duration = Duration::from_millis(50);
+
+/// What a heart is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pulse {
+    /// To beat at once: somebody waits for what this node has read, or this one for what others say.
+    Beat,
+    /// To end.
+    End,
+}
 
 /// A node's beats. They have a thread of their own, so that nothing else that the node does delays them.
 pub(super) struct Heart {
@@ -32,72 +44,98 @@ pub(super) struct Heart {
     /// Is told the addresses of the others.
     pub(super) forwarder: Arc<Forwarder>,
     pub(super) view: watch::Sender<View>,
-    /// Since when a copy is behind those of others, or not there.
-    pub(super) behind_since: Arc<Mutex<Option<Instant>>>,
+    /// Whether it is where the others are.
+    pub(super) lag: Arc<Mutex<Lag>>,
 }
 
 impl Heart {
     /// Beats until it is told to end.
-    pub(super) fn beat(self, end: &Receiver<()>) {
+    pub(super) fn beat(self, pulses: &Receiver<Pulse>) {
         let mut liveness = Liveness::new(self.settings.name.clone());
-        let (mut beats, mut is_silent) = (0, false);
+        let (mut before, mut is_silent) = (View::default(), false);
         loop {
             let begun = Instant::now();
-            match self.beat_once(&mut liveness, &mut beats) {
-                Ok(()) if is_silent => {
+            match self.beat_once(&mut liveness, true) {
+                Ok(own) => {
+                    self.note_lag(&own, &before);
+                    before = self.view.borrow().clone();
+                    if is_silent {
+                        tracing::info!("this node's beats count again");
+                    }
                     is_silent = false;
-                    tracing::info!("this node's beats count again");
                 }
-                Ok(()) => {}
                 Err(error) if !is_silent => {
                     is_silent = true;
                     tracing::warn!(error, "this node's beats do not count: it takes no map over");
                 }
                 Err(_) => {}
             }
-            let rest = BEAT_EVERY.saturating_sub(begun.elapsed());
-            if !matches!(end.recv_timeout(rest), Err(RecvTimeoutError::Timeout)) {
-                return;
+            while let Some(rest) = BEAT_EVERY.checked_sub(begun.elapsed()) {
+                match pulses.recv_timeout(rest) {
+                    Ok(Pulse::Beat) => {
+                        std::thread::sleep(ASKED_EVERY);
+                        if pulses.try_iter().any(|pulse| pulse == Pulse::End) {
+                            return self.end();
+                        }
+                        if let Err(error) = self.beat_once(&mut liveness, false) {
+                            tracing::debug!(error, "a beat that was asked for does not count");
+                        }
+                    }
+                    Ok(Pulse::End) | Err(RecvTimeoutError::Disconnected) => return self.end(),
+                    Err(RecvTimeoutError::Timeout) => break,
+                }
             }
         }
     }
 
-    fn beat_once(&self, liveness: &mut Liveness, beats: &mut u64) -> Result<(), String> {
+    /// Says that nobody is to wait for this node any more.
+    fn end(&self) {
+        let last = Beat { has_ended: true, ..self.own_beat() };
+        if let Err(error) = self.joined.beats.put(&self.settings.name, &last) {
+            tracing::debug!(%error, "the other nodes have to miss this one");
+        }
+    }
+
+    /// Beats, and sees what the others say. Where it `counts`, the silence of others is measured by it.
+    fn beat_once(&self, liveness: &mut Liveness, counts: bool) -> Result<Beat, String> {
         let text = |error: crate::bucket::BucketError| error.to_string();
         let own = self.own_beat();
         let revision = self.joined.beats.put(&self.settings.name, &own).map_err(text)?;
-        liveness.own_beat_acknowledged(revision);
-        *beats += 1;
+        match counts {
+            true => liveness.own_beat_acknowledged(revision),
+            false => liveness.beat_between_acknowledged(revision),
+        }
+        let View { beats, all_beats, .. } = *self.view.borrow();
+        let (beats, all_beats) = (beats + u64::from(counts), all_beats + 1);
         let read = self.joined.beats.read().map_err(text)?;
         let revisions = read.iter().map(|beat| (beat.node.clone(), beat.revision)).collect();
         if !liveness.beats_read(&revisions) {
             // Of a server that lags, unless somebody else beats under this name.
             let there = read.iter().find(|beat| beat.node == self.settings.name);
-            return match there.filter(|there| there.beat.grpc != own.grpc) {
-                Some(other) => Err(format!("another process, at {}, beats as this node", other.beat.grpc)),
-                None => Ok(()),
-            };
+            if let Some(other) = there.filter(|there| there.beat.grpc != own.grpc) {
+                return Err(format!("another process, at {}, beats as this node", other.beat.grpc));
+            }
+            self.view.send_modify(|view| (view.beats, view.all_beats) = (beats, all_beats));
+            return Ok(own);
         }
         let others: Vec<NodeBeat> = read.into_iter().filter(|beat| beat.node != self.settings.name).collect();
         let silent: Vec<NodeName> = liveness.silent().cloned().collect();
         // Each look may take a while: those that are gone anyhow are not looked at.
-        let doubtful = |other: &&NodeBeat| silent.contains(&other.node) && !liveness.is_gone(&other.node);
+        let doubtful = |other: &&NodeBeat| {
+            silent.contains(&other.node) && !liveness.is_gone(&other.node) && !other.beat.has_ended
+        };
         let doubtful: Vec<_> = others.iter().filter(doubtful).collect();
         for other in doubtful {
             if is_refused(&other.beat.grpc) {
                 liveness.port_refused(&other.node);
             }
         }
-        let seen = |NodeBeat { node, beat, .. }: NodeBeat| {
-            let is_live = !liveness.is_gone(&node);
-            (node, Seen { beat, is_live })
+        let seen = |NodeBeat { node, revision, beat }: NodeBeat| {
+            let is_live = !liveness.is_gone(&node) && !beat.has_ended;
+            (node, Seen { beat, revision, is_live })
         };
         let others = others.into_iter().map(seen).collect();
-        let now = View { beats: *beats, seen: Some(Instant::now()), others };
-        let is_behind = is_behind(&own, &self.view.borrow());
-        let mut since = self.behind_since.lock();
-        *since = is_behind.then(|| since.unwrap_or_else(Instant::now));
-        drop(since);
+        let now = View { beats, all_beats, revision, seen: Some(Instant::now()), others };
         tell_changes(&self.view.borrow(), &now);
         let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
         // The secret of the cluster is sent there: in the clear only where this node serves in the clear as well.
@@ -105,29 +143,41 @@ impl Heart {
         let grpc = grpc.filter(|(_, address)| !is_secured || address.starts_with("https://"));
         self.forwarder.set_addresses(grpc.collect());
         self.view.send_replace(now);
-        Ok(())
+        Ok(own)
+    }
+
+    /// Notes whether this node is behind the others. What they had a beat ago is to be here by now; at the first beat it
+    /// is known what they have.
+    fn note_lag(&self, own: &Beat, before: &View) {
+        let now = self.view.borrow();
+        if now.seen.is_none() {
+            return;
+        }
+        let is_behind = is_behind(own, if before.seen.is_some() { before } else { &now });
+        let mut lag = self.lag.lock();
+        *lag = lag.then(is_behind, Instant::now());
     }
 
     fn own_beat(&self) -> Beat {
         let NodeSettings { http, grpc, version, record_version, .. } = self.settings.clone();
         let free_bytes = self.service.measure().disk_free_bytes.unwrap_or(u64::MAX);
         let maps = self.service.shared_maps().into_iter().filter_map(head_of).collect();
-        Beat { http, grpc, version, record_version, maps, free_bytes }
+        Beat { http, grpc, version, record_version, maps, free_bytes, has_ended: false }
     }
 }
 
 fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
-    let Lead::Shared { is_here, epoch, sequence, .. } = map.lead else { return None };
+    let Lead::Shared { is_here, epoch, claim, sequence, .. } = map.lead else { return None };
     let is_parted = map.failure.is_some();
     let revision = map.version.revision;
-    Some((map.version.map_uuid, MapHead { revision, epoch, sequence, leads: is_here, is_parted }))
+    Some((map.version.map_uuid, MapHead { revision, epoch, claim, sequence, leads: is_here, is_parted }))
 }
 
-/// True where a copy is behind where another node was a beat ago, or is not there.
-fn is_behind(own: &Beat, before: &View) -> bool {
+/// True where a copy is behind where another node was then, or is not there.
+fn is_behind(own: &Beat, then: &View) -> bool {
     let is_reached =
         |map: &Uuid, revision: u64| own.maps.get(map).is_some_and(|own| own.revision >= revision);
-    before.furthest().iter().any(|(map, revision)| !is_reached(map, *revision))
+    then.furthest().iter().any(|(map, revision)| !is_reached(map, *revision))
 }
 
 /// Tells the log which nodes have come and gone.

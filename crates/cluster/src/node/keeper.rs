@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc as std_mpsc;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -14,6 +15,7 @@ use uuid::Uuid;
 use super::blocking::{blocking, no_quorum};
 use super::choice::{Choice, Known, choose};
 use super::cutting::Cutting;
+use super::heart::Pulse;
 use super::view::View;
 use crate::following::Following;
 use crate::jetstream_log::JetStreamLog;
@@ -21,6 +23,22 @@ use crate::store::ClusterStore;
 
 /// Pause before a copy is tried again.
 const PAUSE: Duration = Duration::from_secs(1);
+/// How often a node that has claimed looks at the beats of the others, and how many times: they beat as soon as they have
+/// read its claim.
+const LOOKED_EVERY: Duration = Duration::from_millis(100);
+const LOOKS_MAX: u32 = 20;
+
+/// A claim of this node.
+#[derive(Debug, Clone, Copy, Default)]
+struct Claimed {
+    id: Option<Uuid>,
+    /// Its beats before, those in between counted.
+    beats_before: u64,
+    /// A revision of the beats' bucket after it.
+    at: Option<u64>,
+    /// Looks at the beats since.
+    looks: u32,
+}
 
 /// Keeps this node's copy of one map: takes it in where it has none, shares it by its log, and leads it where it is to.
 pub(super) struct Keeper {
@@ -34,6 +52,7 @@ pub(super) struct Keeper {
     /// The node that is to lead the map whenever it can.
     pub(super) wished: watch::Receiver<Option<NodeName>>,
     pub(super) view: watch::Receiver<View>,
+    pub(super) pulse: std_mpsc::Sender<Pulse>,
     /// How often this node took a map over.
     pub(super) takeovers: Arc<AtomicU64>,
 }
@@ -115,7 +134,8 @@ impl Keeper {
     /// Looks with each beat, and whenever the log names another node, whether this one is to lead.
     async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) {
         let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid);
-        let (mut waited_since, mut sequences) = (None, [0; 2]);
+        let (mut waited_since, mut sequences, mut beats_then) = (None, [0; 2], 0);
+        let (mut claimed, mut claim_told) = (Claimed::default(), None);
         loop {
             let view = self.view.borrow_and_update().clone();
             let now = lead.borrow_and_update().clone();
@@ -131,6 +151,15 @@ impl Keeper {
             if leader_is_seen {
                 waited_since = None;
             }
+            if let Lead::Shared { has_claimed, claim, .. } = now {
+                if has_claimed {
+                    claimed.note(claim, &view);
+                } else if claim != claim_told {
+                    // Whoever claimed waits for what this node has.
+                    claim_told = claim;
+                    _ = self.pulse.send(Pulse::Beat);
+                }
+            }
             let wished = self.wished.borrow_and_update().clone();
             let known = Known {
                 own: &self.node,
@@ -141,10 +170,11 @@ impl Keeper {
                 wished: wished.as_ref(),
                 view: &view,
                 waited: view.beats - since,
+                claimed_at: claimed.at,
                 record_version: self.record_version,
             };
             let choice = choose(&known);
-            self.act(choice, &view).await;
+            self.act(choice, &view, &now).await;
             if let Lead::Shared { is_here: true, sequence, .. } = &now {
                 let heads = view.holders(self.uuid).map(|(_, head)| head.sequence);
                 let needed = heads.min().unwrap_or(*sequence);
@@ -155,8 +185,15 @@ impl Keeper {
                     if changed.is_err() {
                         return;
                     }
+                    let beats = self.view.borrow().beats;
                     let Lead::Shared { sequence, .. } = &*lead.borrow() else { continue };
-                    sequences = [sequences[1], *sequence];
+                    if std::mem::replace(&mut beats_then, beats) != beats {
+                        sequences = [sequences[1], *sequence];
+                    }
+                }
+                () = tokio::time::sleep(LOOKED_EVERY), if claimed.waits(&now) => {
+                    claimed.looks += 1;
+                    _ = self.pulse.send(Pulse::Beat);
                 }
                 () = leader_changed(&mut lead, &now) => {}
                 _ = self.wished.changed() => {}
@@ -164,12 +201,19 @@ impl Keeper {
         }
     }
 
-    async fn act(&self, choice: Choice, view: &View) {
+    async fn act(&self, choice: Choice, view: &View, lead: &Lead) {
         let done = match choice {
             Choice::Stay => return,
             Choice::Claim => {
+                let epoch = match lead {
+                    Lead::Shared { epoch, .. } => Some(*epoch),
+                    _ => None,
+                };
+                self.service.claim_map(&self.name, epoch).await
+            }
+            Choice::Open(claim) => {
                 let live = view.holders(self.uuid).map(|(node, head)| (node.clone(), head.revision));
-                let led = self.service.lead_map(&self.name, live.collect()).await;
+                let led = self.service.open_map(&self.name, claim, live.collect()).await;
                 if led.is_ok() {
                     self.takeovers.fetch_add(1, Ordering::Relaxed);
                 }
@@ -186,10 +230,29 @@ impl Keeper {
     }
 }
 
-/// Waits until the log names another node, or this one has taken over or lost the lead.
+impl Claimed {
+    /// Notes what this node sees that has claimed.
+    fn note(&mut self, id: Option<Uuid>, view: &View) {
+        if self.id != id {
+            *self = Self { id, beats_before: view.all_beats, ..Self::default() };
+        }
+        // The first that is acknowledged may have begun before the claim. Where an older copy of the bucket was put back,
+        // its revisions are smaller from then on.
+        if view.all_beats >= self.beats_before + 2 {
+            self.at = Some(self.at.map_or(view.revision, |at| at.min(view.revision)));
+        }
+    }
+
+    /// True while the others' beats are looked at more often.
+    fn waits(&self, lead: &Lead) -> bool {
+        matches!(lead, Lead::Shared { is_here: false, has_claimed: true, .. }) && self.looks < LOOKS_MAX
+    }
+}
+
+/// Waits until there was a claim, or this node has taken over or lost the lead.
 async fn leader_changed(lead: &mut watch::Receiver<Lead>, before: &Lead) {
     let of = |lead: &Lead| match lead {
-        Lead::Shared { leader, is_here, .. } => Some((leader.clone(), *is_here)),
+        Lead::Shared { leader, is_here, claim, .. } => Some((leader.clone(), *is_here, *claim)),
         _ => None,
     };
     let before = of(before);

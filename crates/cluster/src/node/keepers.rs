@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
+use std::sync::mpsc as std_mpsc;
 use std::time::{Duration, Instant};
 
 use mrol_map::map::MapName;
@@ -13,6 +14,7 @@ use tokio::task::JoinHandle;
 use uuid::Uuid;
 
 use super::blocking::blocking;
+use super::heart::Pulse;
 use super::keeper::Keeper;
 use super::settings::NodeSettings;
 use super::view::View;
@@ -46,6 +48,7 @@ pub(super) struct Keepers {
     service: MapService,
     joined: ClusterStore,
     view: watch::Receiver<View>,
+    pulse: std_mpsc::Sender<Pulse>,
     /// How often this node took a map over.
     takeovers: Arc<AtomicU64>,
     kept: BTreeMap<MapName, Kept>,
@@ -73,11 +76,12 @@ impl Keepers {
         service: MapService,
         joined: ClusterStore,
         view: watch::Receiver<View>,
+        pulse: std_mpsc::Sender<Pulse>,
         takeovers: Arc<AtomicU64>,
     ) -> Self {
         let (node, record_version) = (settings.name.clone(), settings.record_version);
         let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
-        Self { node, record_version, service, joined, view, takeovers, kept, revision: 0, deleted }
+        Self { node, record_version, service, joined, view, pulse, takeovers, kept, revision: 0, deleted }
     }
 
     /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
@@ -172,6 +176,7 @@ impl Keepers {
             uuid,
             wished: heard,
             view: self.view.clone(),
+            pulse: self.pulse.clone(),
             takeovers: Arc::clone(&self.takeovers),
         };
         Kept { uuid, wished, task: tokio::spawn(keeper.keep()) }

@@ -5,12 +5,13 @@
 //! 1. `settings`, `view`: what a node is made of, and what it sees of the others.
 //! 2. `choice`: who is to lead a map, by what is seen.
 //! 3. `blocking`: questions to NATS, which block.
-//! 4. `heart`: beats every two seconds, and sees who is gone.
-//! 5. `cutting`: puts a base and cuts the front of a log off.
-//! 6. `keeper`: keeps this node's copy of one map, and leads it where it is to.
-//! 7. `keepers`: one for each map of the cluster's list.
-//! 8. `entering`: enters maps into the list and deletes them, for the operations of the service.
-//! 9. `server`: [`Node`], which puts these together.
+//! 4. `lag`: whether it is where the others are.
+//! 5. `heart`: beats every two seconds, and sees who is gone.
+//! 6. `cutting`: puts a base and cuts the front of a log off.
+//! 7. `keeper`: keeps this node's copy of one map, and leads it where it is to.
+//! 8. `keepers`: one for each map of the cluster's list.
+//! 9. `entering`: enters maps into the list and deletes them, for the operations of the service.
+//! 10. `server`: [`Node`], which puts these together.
 
 mod blocking;
 mod choice;
@@ -19,6 +20,7 @@ mod entering;
 mod heart;
 mod keeper;
 mod keepers;
+mod lag;
 mod server;
 mod settings;
 mod view;

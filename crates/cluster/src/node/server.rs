@@ -18,8 +18,9 @@ use uuid::Uuid;
 
 use super::blocking::blocking;
 use super::entering::Entering;
-use super::heart::Heart;
+use super::heart::{Heart, Pulse};
 use super::keepers::{Keepers, Wish};
+use super::lag::Lag;
 use super::settings::NodeSettings;
 use super::view::View;
 use crate::beat::MapHead;
@@ -39,13 +40,13 @@ pub struct Node {
     forwarder: Arc<Forwarder>,
     joined: Arc<OnceLock<ClusterStore>>,
     view: watch::Sender<View>,
-    /// Since when a copy is behind those of others, or not there.
-    behind_since: Arc<Mutex<Option<Instant>>>,
+    /// Whether it is where the others are.
+    lag: Arc<Mutex<Lag>>,
     takeovers: Arc<AtomicU64>,
     wishes: mpsc::UnboundedSender<Wish>,
     heard: Mutex<Option<mpsc::UnboundedReceiver<Wish>>>,
     work: Mutex<Option<task::JoinHandle<()>>>,
-    heart: Mutex<Option<(std_mpsc::Sender<()>, JoinHandle<()>)>>,
+    heart: Mutex<Option<(std_mpsc::Sender<Pulse>, JoinHandle<()>)>>,
 }
 
 /// What a node knows of the cluster.
@@ -79,7 +80,7 @@ impl Node {
             forwarder: Arc::new(forwarder),
             joined: Arc::default(),
             view: watch::Sender::new(View::default()),
-            behind_since: Arc::default(),
+            lag: Arc::default(),
             takeovers: Arc::default(),
             wishes,
             heard: Mutex::new(Some(heard)),
@@ -107,23 +108,23 @@ impl Node {
         let joined = self.join().await;
         let Some(heard) = self.heard.lock().take() else { return };
         drop(self.joined.set(joined.clone()));
-        let (end, ended) = std_mpsc::channel();
+        let (pulse, pulses) = std_mpsc::channel();
         let heart = Heart {
             settings: self.settings.clone(),
             joined: joined.clone(),
             service: service.clone(),
             forwarder: Arc::clone(&self.forwarder),
             view: self.view.clone(),
-            behind_since: Arc::clone(&self.behind_since),
+            lag: Arc::clone(&self.lag),
         };
-        match std::thread::Builder::new().name("beats".to_owned()).spawn(move || heart.beat(&ended)) {
-            Ok(thread) => *self.heart.lock() = Some((end, thread)),
+        match std::thread::Builder::new().name("beats".to_owned()).spawn(move || heart.beat(&pulses)) {
+            Ok(thread) => *self.heart.lock() = Some((pulse.clone(), thread)),
             Err(error) => {
                 return tracing::error!(%error, "no thread for the node's beats: it takes no part in the cluster");
             }
         }
         let (view, takeovers) = (self.view.subscribe(), Arc::clone(&self.takeovers));
-        let keepers = Keepers::new(&self.settings, service, joined, view, takeovers);
+        let keepers = Keepers::new(&self.settings, service, joined, view, pulse, takeovers);
         keepers.keep(heard).await;
     }
 
@@ -169,12 +170,12 @@ impl Node {
         }
     }
 
-    /// True before it has joined the cluster, where a copy is behind those of others, or lacking, for so long, and
-    /// where NATS has told nothing of the others for half a minute: then it cannot know.
+    /// True before it has joined the cluster and was where the others are, where a copy is behind theirs, or lacking,
+    /// for so long, and where NATS has told nothing of the others for half a minute: then it cannot know.
     pub fn is_behind(&self, lag_max: Duration) -> bool {
-        let since = *self.behind_since.lock();
+        let lag = *self.lag.lock();
         let sees = self.view.borrow().seen.is_some_and(|seen| seen.elapsed() < SIGHT_LOST);
-        !sees || since.is_some_and(|since| since.elapsed() > lag_max)
+        !sees || lag.is_over(lag_max)
     }
 
     /// Hands the maps that it leads over to others, waits until those have taken over, for some seconds at most, and
@@ -211,8 +212,8 @@ impl Node {
         let work = self.work.lock().take();
         work.inspect(task::JoinHandle::abort);
         let heart = self.heart.lock().take();
-        if let Some((end, thread)) = heart {
-            drop(end);
+        if let Some((pulse, thread)) = heart {
+            _ = pulse.send(Pulse::End);
             // It may wait for NATS.
             drop(tokio::time::timeout(CONNECT_AGAIN, task::spawn_blocking(|| thread.join())).await);
         }

@@ -11,8 +11,12 @@ use crate::beat::{Beat, MapHead};
 /// What a node sees of the others after a beat of its own was acknowledged.
 #[derive(Debug, Clone, Default)]
 pub(super) struct View {
-    /// Own beats that were acknowledged.
+    /// Own beats that were acknowledged, one every two seconds.
     pub(super) beats: u64,
+    /// The same, with those in between.
+    pub(super) all_beats: u64,
+    /// Revision of the bucket with the last of them.
+    pub(super) revision: u64,
     /// When the last of them was.
     pub(super) seen: Option<Instant>,
     /// The other nodes, those that are gone among them.
@@ -24,7 +28,9 @@ pub(super) struct View {
 pub(super) struct Seen {
     /// Its last beat.
     pub(super) beat: Beat,
-    /// False once it is gone.
+    /// Revision of the bucket with it.
+    pub(super) revision: u64,
+    /// False once it is gone, or has ended.
     pub(super) is_live: bool,
 }
 

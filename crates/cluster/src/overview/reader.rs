@@ -16,6 +16,8 @@ use crate::store::ClusterStore;
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 /// How often it is looked meanwhile.
 const LOOKED_EVERY: Duration = Duration::from_millis(200);
+/// How long a look may fail: a server of NATS that lags by a moment answers with what was before.
+const TRIED_FOR: Duration = Duration::from_secs(3);
 
 /// Looks at a cluster again and again: a node is live that has beaten since the first look.
 #[derive(Debug)]
@@ -46,7 +48,10 @@ impl OverviewReader {
     /// # Errors
     /// Nobody answered.
     pub fn begin(store: ClusterStore) -> Result<Self, OverviewError> {
-        let first = store.beats.read()?.into_iter().map(|beat| (beat.node, beat.revision)).collect();
+        let first = patiently(|| Ok(store.beats.read()?))?
+            .into_iter()
+            .map(|beat| (beat.node, beat.revision))
+            .collect();
         Ok(Self { store, first, begun: Instant::now() })
     }
 
@@ -60,13 +65,16 @@ impl OverviewReader {
     /// # Errors
     /// Nobody answered.
     pub fn look(&self) -> Result<Overview, OverviewError> {
-        let (listing, _) = self.store.catalog.read()?;
+        let (listing, _) = patiently(|| Ok(self.store.catalog.read()?))?;
         let seen = |NodeBeat { node, revision, beat }: NodeBeat| {
             // A server of NATS that lags shows an older beat.
-            let is_live = self.first.get(&node).is_none_or(|first| revision > *first);
+            let is_live = self.first.get(&node).is_none_or(|first| revision > *first) && !beat.has_ended;
             SeenNode { node, is_live, beat }
         };
-        Ok(Overview::of(&listing, self.store.beats.read()?.into_iter().map(seen).collect()))
+        Ok(Overview::of(
+            &listing,
+            patiently(|| Ok(self.store.beats.read()?))?.into_iter().map(seen).collect(),
+        ))
     }
 
     /// Looks until every node has beaten, or those that have not are silent.
@@ -76,11 +84,22 @@ impl OverviewReader {
     pub fn settled(&self) -> Result<Overview, OverviewError> {
         loop {
             let seen = self.look()?;
-            let are_live = seen.nodes.iter().all(|node| node.is_live);
+            let are_live = seen.nodes.iter().all(|node| node.is_live || node.beat.has_ended);
             if are_live || self.begun.elapsed() >= SILENT_AFTER {
                 return Ok(seen);
             }
             thread::sleep(LOOKED_EVERY);
+        }
+    }
+}
+
+/// Looks again until it is seen, for a while.
+fn patiently<T>(look: impl Fn() -> Result<T, OverviewError>) -> Result<T, OverviewError> {
+    let begun = Instant::now();
+    loop {
+        match look() {
+            Err(_) if begun.elapsed() < TRIED_FOR => thread::sleep(LOOKED_EVERY),
+            seen => return seen,
         }
     }
 }

@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     fn copy(node: &str, revision: u64, epoch: u64, leads: bool, is_live: bool) -> MapCopy {
-        let head = MapHead { revision, epoch, sequence: revision, leads, is_parted: false };
+        let head = MapHead { revision, epoch, claim: None, sequence: revision, leads, is_parted: false };
         MapCopy { node: NodeName::new(node).unwrap(), is_live, head }
     }
 

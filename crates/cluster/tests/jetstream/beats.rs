@@ -16,9 +16,10 @@ fn beat(revision: u64) -> Beat {
         record_version: 1,
         maps: BTreeMap::from([(
             Uuid::from_u128(1),
-            MapHead { revision, epoch: 2, sequence: revision, leads: false, is_parted: false },
+            MapHead { revision, epoch: 2, claim: None, sequence: revision, leads: false, is_parted: false },
         )]),
         free_bytes: 1 << 30,
+        has_ended: false,
     }
 }
 

@@ -11,7 +11,7 @@ use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{ContentHash, MapName, MapSettings, RobotName};
 use mrol_map::mapping::Guess;
 use mrol_service::replication::NodeName;
-use mrol_service::{MapService, Reason, ScanRequest, ServiceError, ServiceSettings};
+use mrol_service::{Lead, MapService, Reason, ScanRequest, ServiceError, ServiceSettings};
 use mrol_store::OpeningProgress;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
@@ -84,7 +84,14 @@ fn lead(runtime: &Runtime, nodes: &[&Node], leader: usize) {
     eventually(|| {
         let others = nodes.iter().enumerate().filter(|(index, _)| *index != leader);
         let live = others.map(|(_, node)| (node.name.clone(), node.version(runtime).0)).collect();
-        runtime.block_on(nodes[leader].service.lead_map(&map(), live))
+        runtime.block_on(async {
+            nodes[leader].service.claim_map(&map(), None).await?;
+            let claim = match &*nodes[leader].service.lead_of(&map()).await?.borrow() {
+                Lead::Shared { claim, .. } => *claim,
+                _ => None,
+            };
+            nodes[leader].service.open_map(&map(), claim, live).await
+        })
     });
 }
 

@@ -1,5 +1,7 @@
 //! Which node makes the changes of a map.
 
+use uuid::Uuid;
+
 use crate::replication::{Member, NodeName};
 
 /// Which node makes the changes of a map, as far as this server knows.
@@ -15,8 +17,14 @@ pub enum Lead {
         leader: Option<NodeName>,
         /// True where that is this one, and it has taken over.
         is_here: bool,
+        /// True where that is this one, and it claimed since it was started: it takes over once it knows how far the
+        /// others are.
+        has_claimed: bool,
         /// How many claims there were.
         epoch: u64,
+        /// The id of the last, where this node has read it. The number of claims alone does not say which log was read:
+        /// where an older copy of it is put back, another claim gets the number.
+        claim: Option<Uuid>,
         /// Number of the last message of the log that was read.
         sequence: u64,
     },
@@ -27,7 +35,9 @@ impl Lead {
         Self::Shared {
             leader: member.leader().cloned(),
             is_here: member.leads(),
+            has_claimed: member.has_claimed(),
             epoch: member.epoch(),
+            claim: member.last_claim(),
             sequence: member.position().sequence,
         }
     }

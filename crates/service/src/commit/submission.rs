@@ -49,8 +49,11 @@ pub(crate) enum SharedAct {
     Join { log: Arc<dyn ReplicatedLog>, node: NodeName, map: Uuid },
     /// Makes what the log has, unless the message of this number was read already.
     Follow { newest: Option<u64> },
-    /// Takes over, where no live node is ahead of this one: those nodes, with the revisions that they are at.
-    Lead(Vec<(NodeName, u64)>),
+    /// Claims to lead, unless the log names another in an epoch after `epoch`.
+    Claim { epoch: Option<u64> },
+    /// Takes over by its claim of this id, where none of the `live` nodes is ahead of this one, by the revisions that
+    /// they had once they had read the claim.
+    Open { claim: Option<Uuid>, live: Vec<(NodeName, u64)> },
     /// Gives the lead to another node.
     HandOver(NodeName),
     /// Tells where another node can begin to read, with a copy of this node's map as it is now or later; none where

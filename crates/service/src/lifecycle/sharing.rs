@@ -38,8 +38,9 @@ impl MapService {
     pub fn shared_maps(&self) -> Vec<SharedMap> {
         let describe = |map: Arc<HostedMap>| SharedMap {
             name: map.name.clone(),
-            version: map.version_now(),
+            // Before the version: a node that has read a claim has made at least what came before it.
             lead: map.lead(),
+            version: map.version_now(),
             failure: map.failure().map(str::to_owned),
             has_diverged: map.has_diverged(),
         };
@@ -153,24 +154,35 @@ impl MapService {
         }
     }
 
-    /// Takes the lead of a shared map over, and gives its log what only this node has. `live` are the other nodes that
-    /// are up and have not parted from the log, with the revisions that they are at: a node that is behind one of them
-    /// does not take over.
+    /// Claims to lead a shared map. `epoch` is that of [`Lead::Shared`] when this was chosen: where the log names another
+    /// node in a later one, that one is followed. With none, the claim comes after whoever leads by then.
     ///
     /// # Errors
-    /// As for [`MapService::share_map`]; `NotLeader` where another node was faster, `NoQuorum` where one is ahead.
-    pub async fn lead_map(
+    /// As for [`MapService::share_map`]; `NotLeader` where another node was faster.
+    pub async fn claim_map(&self, name: &MapName, epoch: Option<u64>) -> Result<MapVersion, ServiceError> {
+        self.act_on(name, SharedAct::Claim { epoch }).await?.ok_or_else(went_on)
+    }
+
+    /// Takes over a shared map by this node's claim, whose id [`Lead::Shared`] tells, and gives its log what only this node has. `live` are
+    /// the other nodes that are up and have not parted from the log, with the revisions that they had once they had read
+    /// the claim: a node that is behind one of them does not take over.
+    ///
+    /// # Errors
+    /// As for [`MapService::share_map`]; `NotLeader` where that was not the last claim, `NoQuorum` where another is
+    /// ahead.
+    pub async fn open_map(
         &self,
         name: &MapName,
+        claim: Option<Uuid>,
         live: Vec<(NodeName, u64)>,
     ) -> Result<MapVersion, ServiceError> {
-        self.act_on(name, SharedAct::Lead(live)).await?.ok_or_else(went_on)
+        self.act_on(name, SharedAct::Open { claim, live }).await?.ok_or_else(went_on)
     }
 
     /// Gives the lead of a shared map to another node.
     ///
     /// # Errors
-    /// As for [`MapService::share_map`]; `NotLeader` where this node does not lead.
+    /// As for [`MapService::share_map`]; `NotLeader` where this node neither leads nor has claimed to.
     pub async fn hand_map_over(&self, name: &MapName, node: NodeName) -> Result<MapVersion, ServiceError> {
         self.act_on(name, SharedAct::HandOver(node)).await?.ok_or_else(went_on)
     }

@@ -29,6 +29,8 @@ pub(crate) struct Member {
     reading: Reading,
     /// False before it knows where the log begins.
     has_begun: bool,
+    /// The id of the last claim that it made for itself, since it joined.
+    own_claim: Option<Uuid>,
     /// The epoch in which this node makes changes; none before it took over.
     opened: Option<u64>,
     /// The last revision of the log that is known to be the same in this node's folder.
@@ -66,6 +68,7 @@ impl Member {
             log,
             reading: Reading::from(Base::default()),
             has_begun: false,
+            own_claim: None,
             opened: None,
             agreed: None,
             pending: None,
@@ -122,6 +125,17 @@ impl Member {
         self.leader() == Some(&self.node)
     }
 
+    /// The id of the last claim, where this node has read it.
+    pub(crate) fn last_claim(&self) -> Option<Uuid> {
+        self.reading.claim
+    }
+
+    /// True where this node claimed last, and since it joined: an earlier process of its name, or one beside it, may have
+    /// claimed as well.
+    pub(crate) fn has_claimed(&self) -> bool {
+        self.reading.claim.is_some() && self.reading.claim == self.own_claim
+    }
+
     /// True where this node makes the map's changes: the log names it, and it took over.
     pub(crate) fn leads(&self) -> bool {
         self.opened.is_some() && self.opened == self.own_epoch()
@@ -170,8 +184,9 @@ impl Member {
     pub(crate) fn begin_again(&mut self) -> Result<(), LogError> {
         self.reading = Reading::from(self.log.base()?);
         self.has_begun = true;
-        // What this node has and the log lost is given back before more comes behind it.
-        (self.agreed, self.opened, self.pending) = (None, None, None);
+        // What this node has and the log lost is given back before more comes behind it. Others may have read what it
+        // published last and never heard of: a claim that is still there says nothing of that, so it claims again.
+        (self.agreed, self.opened, self.own_claim, self.pending) = (None, None, None, None);
         Ok(())
     }
 
@@ -322,8 +337,13 @@ impl Member {
         position: Position,
         message: Message,
     ) -> Result<Option<OrderedChanges>, NotOrdered> {
+        let is_claim = matches!(message.body, Body::Claim(_));
         let entry = Entry { sequence: position.sequence + 1, message };
-        self.reading.read(entry).map_err(|_| NotOrdered::Overtaken)
+        let whole = self.reading.read(entry).map_err(|_| NotOrdered::Overtaken)?;
+        if is_claim && self.is_named() {
+            self.own_claim = self.reading.claim;
+        }
+        Ok(whole)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What follows from the messages of a log: every node that has read the same messages knows the same.
 
 use bytes::{Bytes, BytesMut};
+use uuid::Uuid;
 
 use super::message::{Body, Changes, Entry, Piece, Position};
 use super::node_name::NodeName;
@@ -30,6 +31,8 @@ pub(crate) struct Reading {
     pub(super) position: Position,
     pub(super) epoch: u64,
     pub(super) leader: Option<NodeName>,
+    /// The id of the last claim, where it was read.
+    pub(super) claim: Option<Uuid>,
     /// The revision of the last change in the log.
     pub(super) head: u64,
     /// Where it began.
@@ -65,7 +68,7 @@ impl Reading {
     /// That of a node which has read nothing behind `base`.
     pub(super) fn from(base: Base) -> Self {
         let Base { position, epoch, leader, revision, .. } = base.clone();
-        Self { position, epoch, leader, head: revision, base, pieces: None }
+        Self { position, epoch, leader, claim: None, head: revision, base, pieces: None }
     }
 
     /// Where others can begin to read, with a map that is at the head; none in the middle of a change, of which they
@@ -97,6 +100,7 @@ impl Reading {
             Body::Claim(leader) => {
                 // What the one before began, nobody ends.
                 (self.epoch, self.leader, self.pieces) = (epoch, Some(leader), None);
+                self.claim = Some(entry.message.id);
                 None
             }
             // Of a leader that did not know of the claim yet: all nodes leave it out.
@@ -144,8 +148,6 @@ impl Pieces {
 
 #[cfg(test)]
 mod tests {
-    use uuid::Uuid;
-
     use super::*;
     use crate::replication::message::Message;
 

@@ -11,4 +11,6 @@ pub(crate) enum Rule {
     CaughtUp,
     /// What is sent again is the same message.
     SameId,
+    /// It makes changes only after the other live nodes have said how far they are, having read its claim.
+    FreshHeads,
 }

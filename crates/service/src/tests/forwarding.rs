@@ -160,7 +160,7 @@ async fn a_change_waits_for_the_lead_to_come_here() {
     let change = nodes.b.service.insert_scan(&nodes.map, scan_of("r", 0.05));
     let take_over = async {
         tokio::time::sleep(Duration::from_millis(100)).await;
-        nodes.b.service.lead_map(&nodes.map, Vec::new()).await.unwrap();
+        nodes.b.lead(&nodes.map).await;
     };
     let (answer, ()) = tokio::join!(change, take_over);
     assert!(answer.unwrap().accepted);
@@ -207,7 +207,7 @@ async fn a_watch_of_events_moves_with_the_lead_and_tells_each_event_once() {
     // And back, to a node that has an event from before.
     nodes.b.service.hand_map_over(&nodes.map, nodes.a.name.clone()).await.unwrap();
     nodes.a.service.follow_map(&nodes.map, None).await.unwrap();
-    nodes.a.service.lead_map(&nodes.map, Vec::new()).await.unwrap();
+    nodes.a.lead(&nodes.map).await;
     nodes.b.service.follow_map(&nodes.map, None).await.unwrap();
     nodes.a.service.insert_scan(&nodes.map, scan_of("third", 2.05)).await.unwrap();
     assert_eq!(next_robot().await, "third");

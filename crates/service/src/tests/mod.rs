@@ -1,6 +1,7 @@
 //! Tests of the service as a whole.
 
 mod forwarding;
+mod leading;
 mod looks;
 #[cfg(feature = "shuttle")]
 mod modeled;

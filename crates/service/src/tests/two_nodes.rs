@@ -8,6 +8,7 @@ use uuid::Uuid;
 
 use crate::caller::{AllowedMaps, AllowedScans};
 use crate::cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, SharedCatalog};
+use crate::commit::Lead;
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::replication::{MemoryLog, NodeLog, NodeName};
@@ -75,7 +76,7 @@ impl TwoNodes {
     /// The same, where `a` leads and `b` knows.
     pub(super) async fn led_by_a() -> Self {
         let nodes = Self::begin().await;
-        nodes.a.service.lead_map(&nodes.map, Vec::new()).await.unwrap();
+        nodes.a.lead(&nodes.map).await;
         nodes.b.service.follow_map(&nodes.map, None).await.unwrap();
         nodes
     }
@@ -88,11 +89,25 @@ impl TwoNodes {
     /// `b` takes over what it was given.
     pub(super) async fn take_over(&self) {
         self.b.service.follow_map(&self.map, None).await.unwrap();
-        self.b.service.lead_map(&self.map, Vec::new()).await.unwrap();
+        self.b.lead(&self.map).await;
     }
 }
 
 impl Node {
+    /// Takes over: the other has nothing that this one has not.
+    pub(super) async fn lead(&self, map: &MapName) {
+        self.service.claim_map(map, None).await.unwrap();
+        self.service.open_map(map, self.claim_of(map).await, Vec::new()).await.unwrap();
+    }
+
+    /// The last claim of a map that it has read.
+    pub(super) async fn claim_of(&self, map: &MapName) -> Option<Uuid> {
+        match &*self.service.lead_of(map).await.unwrap().borrow() {
+            Lead::Shared { claim, .. } => *claim,
+            _ => None,
+        }
+    }
+
     fn begin(name: &str) -> Self {
         let (name, other) = (NodeName::new(name).unwrap(), Arc::<Other>::default());
         let data_dir = tempfile::tempdir().unwrap();

@@ -229,7 +229,7 @@ mod tests {
     use super::*;
 
     fn node(name: &str, record_version: u32, free_bytes: u64, leads: bool) -> SeenNode {
-        let head = MapHead { revision: 1, epoch: 1, sequence: 1, leads, is_parted: false };
+        let head = MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads, is_parted: false };
         let beat = Beat {
             http: String::new(),
             grpc: String::new(),
@@ -237,6 +237,7 @@ mod tests {
             record_version,
             maps: BTreeMap::from([(Uuid::nil(), head)]),
             free_bytes,
+            has_ended: false,
         };
         SeenNode { node: NodeName::new(name).unwrap(), is_live: true, beat }
     }

@@ -38,7 +38,7 @@ impl History {
             }
         }
         let revision = |node: &Node| node.process.as_ref().map_or(0, |process| process.map.revision());
-        (0..NODES).try_for_each(|node| self.lead(node))?;
+        (0..NODES).try_for_each(|node| self.lead(node, 1.0))?;
         (0..NODES).try_for_each(|node| self.act(node, SharedAct::Follow { newest: None }))?;
         if self.is_double {
             return self.check_told();
@@ -73,7 +73,7 @@ impl History {
     /// where the node that is further no longer keeps what the log lost, neither of the two takes over.
     pub(super) fn check_told(&mut self) -> Checked {
         for _ in 0..2 {
-            (0..NODES).try_for_each(|node| self.lead(node))?;
+            (0..NODES).try_for_each(|node| self.lead(node, 1.0))?;
             (0..NODES).try_for_each(|node| self.act(node, SharedAct::Follow { newest: None }))?;
         }
         let agreeing = self.nodes.iter().filter_map(|node| {

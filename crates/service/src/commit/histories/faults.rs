@@ -21,7 +21,10 @@ use mrol_store::Snapshot;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn lead(history: &mut History, node: usize) -> Outcome {
-    history.nodes[node].process.as_mut().unwrap().act(SharedAct::Lead(Vec::new()))
+    let process = history.nodes[node].process.as_mut().unwrap();
+    process.act(SharedAct::Claim { epoch: None })?;
+    let claim = process.worker.member.as_ref().unwrap().last_claim();
+    process.act(SharedAct::Open { claim, live: Vec::new() })
 }
 
 fn follow(history: &mut History, node: usize) -> Outcome {
@@ -322,7 +325,9 @@ fn while_the_log_is_silent_only_the_first_that_waits_tries_it() {
     process
         .act(SharedAct::Join { log: Arc::<Dead>::clone(&log), node: node.name.clone(), map: MAP })
         .unwrap();
-    process.act(SharedAct::Lead(Vec::new())).unwrap();
+    process.act(SharedAct::Claim { epoch: None }).unwrap();
+    let claim = process.worker.member.as_ref().unwrap().last_claim();
+    process.act(SharedAct::Open { claim, live: Vec::new() }).unwrap();
     let mut gone = Vec::new();
     for number in 0..100 {
         let (answer, outcome) = oneshot::channel();

@@ -56,6 +56,7 @@ impl History {
             name: NodeName::new(&format!("node-{i}")).unwrap(),
             disk: simulated::SimulatedDisk::default(),
             process: None,
+            beat: None,
         };
         Self {
             rng: ChaCha8Rng::seed_from_u64(seed),
@@ -122,7 +123,10 @@ impl History {
         match self.rng.random_range(0..100) {
             0..40 => self.change(node)?,
             40..60 => self.act(node, SharedAct::Follow { newest: None })?,
-            60..72 => self.lead(node)?,
+            60..66 => self.lead(node, 0.8)?,
+            66..68 => self.claim(node)?,
+            68..70 => self.open(node)?,
+            70..72 => self.beat(node),
             72..75 => {
                 let to = self.nodes[self.rng.random_range(0..NODES)].name.clone();
                 self.act(node, SharedAct::HandOver(to))?;
@@ -202,22 +206,58 @@ impl History {
         }
     }
 
-    /// A node tries to take over; it knows how far the live ones are.
-    pub(super) fn lead(&mut self, node: usize) -> Checked {
-        let live = self.nodes.iter().enumerate().filter(|(other, _)| *other != node);
-        let live = live.filter_map(|(_, it)| {
-            // One that parted from the log leads nobody.
-            let process = it.process.as_ref().filter(|process| process.worker.stopped.get().is_none())?;
-            Some((it.name.clone(), process.map.revision()))
-        });
-        let live = live.collect();
-        self.act(node, SharedAct::Lead(live))?;
+    /// A node says how far it is, and which claim it has read last.
+    pub(super) fn beat(&mut self, node: usize) {
+        let Node { process, beat, .. } = &mut self.nodes[node];
+        // One that parted from the log leads nobody.
+        let process = process.as_ref().filter(|process| process.worker.stopped.get().is_none());
+        let member = process.and_then(|process| process.worker.member.as_ref());
+        *beat = process.zip(member).map(|(process, member)| (member.last_claim(), process.map.revision()));
+    }
+
+    /// A node claims to lead.
+    pub(super) fn claim(&mut self, node: usize) -> Checked {
+        self.act(node, SharedAct::Claim { epoch: None })
+    }
+
+    /// A node takes over what it claimed, if the others have beaten since they read the claim: those that are down are
+    /// known to be.
+    pub(super) fn open(&mut self, node: usize) -> Checked {
+        let Some(process) = &self.nodes[node].process else { return Ok(()) };
+        let Some(member) = &process.worker.member else { return Ok(()) };
+        let claim = member.last_claim();
+        let takes_part =
+            |it: &Node| it.process.as_ref().is_some_and(|process| process.worker.stopped.get().is_none());
+        let others = self.nodes.iter().enumerate().filter(|(other, it)| *other != node && takes_part(it));
+        let beats: Vec<_> = others.map(|(_, it)| (it.name.clone(), it.beat)).collect();
+        let are_fresh = beats.iter().all(|(_, beat)| beat.is_some_and(|(its_claim, _)| its_claim == claim));
+        if !are_fresh && self.left_out != Some(Rule::FreshHeads) {
+            return Ok(());
+        }
+        let live = beats.into_iter().filter_map(|(name, beat)| Some((name, beat?.1))).collect();
+        self.act(node, SharedAct::Open { claim, live })?;
         let Some(process) = &self.nodes[node].process else { return Ok(()) };
         let end = self.log.lock().end();
         if process.worker.member.as_ref().is_some_and(|it| it.leads() && it.position() == end) {
             self.is_fragile = false;
         }
         Ok(())
+    }
+
+    /// A node takes over; the others read its claim, each as likely as said, and say how far they are.
+    pub(super) fn lead(&mut self, node: usize, reading: f64) -> Checked {
+        self.claim(node)?;
+        if self.rng.random_bool(0.3) {
+            // Before it has heard of the others.
+            self.open(node)?;
+        }
+        for other in 0..NODES {
+            if self.rng.random_bool(reading) {
+                self.act(other, SharedAct::Follow { newest: None })?;
+            }
+            self.beat(other);
+        }
+        self.open(node)
     }
 
     /// A process is killed, or its machine loses its power, or its disk.
@@ -295,7 +335,8 @@ impl History {
         let is_whole = members.len() == NODES
             && members.iter().any(has_all)
             && members.iter().all(|member| !member.leads() || member.epoch() == log.epoch());
-        if is_whole && !self.is_fragile && self.left_out.is_none() {
+        let is_looked_for = matches!(self.left_out, None | Some(Rule::FreshHeads));
+        if is_whole && !self.is_fragile && is_looked_for {
             let messages = self.rng.random_range(1..8).min(log.len());
             log.lose_newest(messages);
             if self.is_told {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 use tokio::sync::{oneshot, watch};
+use uuid::Uuid;
 
 use super::changes::{MAP, name};
 use crate::commit::lead::Lead;
@@ -29,6 +30,8 @@ pub(super) struct Node {
     pub(super) disk: simulated::SimulatedDisk,
     /// None while it is down.
     pub(super) process: Option<Process>,
+    /// What it said last: the claim that it had read, and its revision.
+    pub(super) beat: Option<(Option<Uuid>, u64)>,
 }
 
 pub(super) struct Process {

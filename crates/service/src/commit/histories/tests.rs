@@ -24,7 +24,7 @@ fn nothing_acknowledged_is_lost_and_nothing_is_made_twice() {
 
 #[test]
 fn a_node_that_leaves_out_a_rule_is_found_out() {
-    for rule in [Rule::OwnEpoch, Rule::Position, Rule::CaughtUp, Rule::SameId] {
+    for rule in [Rule::OwnEpoch, Rule::Position, Rule::CaughtUp, Rule::SameId, Rule::FreshHeads] {
         let found = (0..histories())
             .find_map(|seed| History::new(seed, Some(rule)).run().err().map(|Violation(what)| (seed, what)));
         let (seed, what) = found.unwrap_or_else(|| panic!("{rule:?} is left out, and no history shows it"));

@@ -24,7 +24,8 @@ impl Worker {
             SharedAct::Join { .. } => {}
             SharedAct::Follow { newest } if newest == Some(member.position().sequence) => {}
             SharedAct::Follow { .. } => return self.follow(),
-            SharedAct::Lead(live) => self.lead(&live)?,
+            SharedAct::Claim { epoch } => self.claim(epoch)?,
+            SharedAct::Open { claim, live } => self.open(claim, &live)?,
             SharedAct::HandOver(node) => self.hand_over(node)?,
             #[cfg(test)]
             SharedAct::Base(told) => {

@@ -6,21 +6,18 @@ use crate::commit::worker::Worker;
 use crate::error::ServiceError;
 use crate::replication::{Member, NodeName, NotOrdered};
 use mrol_store::Record;
+use uuid::Uuid;
 
 impl Worker {
-    /// Takes over: claims the lead where the log names another, gives the log what only this node has, and makes
-    /// changes from then on.
-    pub(super) fn lead(&mut self, live: &[(NodeName, u64)]) -> Result<(), ServiceError> {
-        match self.settle_pending() {
-            Err(Refusal::Failed(error)) => return Err(error),
-            Ok(()) | Err(Refusal::Stale) => self.catch_up()?,
-        }
+    /// Claims to lead. Whoever chose that it does may not have known of the last claims: where the log names another node
+    /// in an epoch after `epoch`, that one leads.
+    pub(super) fn claim(&mut self, epoch: Option<u64>) -> Result<(), ServiceError> {
+        self.settle_and_catch_up()?;
         let revision = self.map.revision();
-        if let Some((node, head)) = live.iter().find(|(_, head)| *head > revision) {
-            let reason = format!("node {node} has revision {head}, this one {revision}");
-            return Err(no_quorum(&self.name, &reason));
-        }
         let Some(member) = &self.member else { return Ok(()) };
+        if let Some(leader) = member.other_leader().filter(|_| epoch.is_some_and(|it| it < member.epoch())) {
+            return Err(not_leader(&self.name, Some(leader)));
+        }
         let head = member.head();
         if !member.agrees() {
             return Err(self.cannot_tell(head));
@@ -34,9 +31,35 @@ impl Worker {
         let Some(member) = &mut self.member else { return Ok(()) };
         // Also where the log names this node: another process of its name may have claimed, or this one before it was
         // started again.
-        if !member.leads() {
+        if !member.leads() && !member.has_claimed() {
             let claimed = member.claim_for_itself();
             self.settled(claimed)?;
+            if let Some(member) = &self.member {
+                tracing::info!(map = %self.name, epoch = member.epoch(), revision, "claims to lead");
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes over by its claim of this id: gives the log what only this node has, and makes changes from then on. The `live`
+    /// nodes have said how far they are after they had read the claim. A claim alone does not tell: where the log lost
+    /// its newest messages, what it has is no measure of what another node made.
+    pub(super) fn open(&mut self, claim: Option<Uuid>, live: &[(NodeName, u64)]) -> Result<(), ServiceError> {
+        self.settle_and_catch_up()?;
+        let revision = self.map.revision();
+        let Some(member) = &self.member else { return Ok(()) };
+        if member.leads() {
+            return Ok(());
+        }
+        if !member.has_claimed() || member.last_claim() != claim {
+            return Err(not_leader(&self.name, member.other_leader()));
+        }
+        if let Some((node, head)) = live.iter().find(|(_, head)| *head > revision) {
+            let reason = format!("node {node} has revision {head}, this one {revision}");
+            return Err(no_quorum(&self.name, &reason));
+        }
+        if !member.agrees() {
+            return Err(self.cannot_tell(member.head()));
         }
         self.give_back()?;
         if let Some(member) = &mut self.member {
@@ -44,6 +67,13 @@ impl Worker {
             tracing::info!(map = %self.name, epoch = member.epoch(), revision, "leads");
         }
         Ok(())
+    }
+
+    fn settle_and_catch_up(&mut self) -> Result<(), ServiceError> {
+        match self.settle_pending() {
+            Err(Refusal::Failed(error)) => Err(error),
+            Ok(()) | Err(Refusal::Stale) => self.catch_up(),
+        }
     }
 
     /// Publishes what this node has and the log lost.
@@ -82,9 +112,11 @@ impl Worker {
         Ok(())
     }
 
+    /// Gives the lead to another node, or what it claimed to lead.
     pub(super) fn hand_over(&mut self, node: NodeName) -> Result<(), ServiceError> {
         self.catch_up()?;
-        let Some(member) = self.member.as_mut().filter(|member| member.leads()) else {
+        let Some(member) = self.member.as_mut().filter(|member| member.leads() || member.has_claimed())
+        else {
             return Err(not_leader(&self.name, self.member.as_ref().and_then(Member::other_leader)));
         };
         let claimed = member.claim(node);
