@@ -11,6 +11,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod faults;
+mod figures;
 mod link;
 mod load;
 #[expect(dead_code, reason = "the tests of the log use more of it")]
