@@ -10,7 +10,7 @@ const NOBODY: &str = "nats://127.0.0.1:9";
 
 #[test]
 fn every_command_explains_itself_with_examples() {
-    for command in ["status", "check", "move", "adopt", "keep", "config"] {
+    for command in ["status", "check", "move", "adopt", "keep", "forget", "config"] {
         let help = mrol(&["cluster", command, "--help"]).assert().success().get_output().stdout.clone();
         let help = String::from_utf8(help).unwrap();
         let example = format!("EXAMPLES:\n  mrol cluster {command} ");
@@ -23,8 +23,14 @@ fn a_command_that_cannot_reach_nats_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().to_str().unwrap();
     std::fs::create_dir(folder.path().join("maps")).unwrap();
-    let commands: [&[&str]; 5] =
-        [&["status"], &["check"], &["move", "office", "n2"], &["adopt", data], &["keep", "n2", "office"]];
+    let commands: [&[&str]; 6] = [
+        &["status"],
+        &["check"],
+        &["move", "office", "n2"],
+        &["adopt", data],
+        &["keep", "n2", "office"],
+        &["forget", "n3"],
+    ];
     for command in commands {
         let call = [&["cluster"], command].concat();
         let missing = complaint(&call, 2);

@@ -2,7 +2,7 @@
 
 use clap::Subcommand;
 
-use super::{adopt, check, config, keep, moving, status};
+use super::{adopt, check, config, forget, keep, moving, status};
 use mrol::console::{CliError, Output};
 
 const EXAMPLES: &str = "\
@@ -14,6 +14,7 @@ EXAMPLES:
   mrol cluster move office n2 --config mrol.toml     node n2 is to lead map office
   mrol cluster adopt ./mrol-data --config mrol.toml  take the maps of a server into the cluster
   mrol cluster keep n2 office --config mrol.toml     where histories differ: n2's copy becomes the map
+  mrol cluster forget n3 --config mrol.toml      node n3 left for good
 
 A command reaches NATS as a node does: by the section `cluster` of --config FILE, MROL_CLUSTER__... variables, and --nats,
 which comes last. `mrol cluster COMMAND --help` explains a command. To make a server a node: `mrol serve --help`.";
@@ -33,6 +34,7 @@ enum Action {
     Move(moving::MoveLead),
     Adopt(adopt::Adopt),
     Keep(keep::Keep),
+    Forget(forget::Forget),
     Config(config::NatsConfig),
 }
 
@@ -44,6 +46,7 @@ impl Cluster {
             Action::Move(moving) => moving.run(output),
             Action::Adopt(adopt) => adopt.run(output),
             Action::Keep(keep) => keep.run(&output),
+            Action::Forget(forget) => forget.run(&output),
             Action::Config(config) => config.run(&output),
         }
     }

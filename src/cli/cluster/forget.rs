@@ -1,0 +1,104 @@
+//! `mrol cluster forget`: takes a node that left for good off the list of nodes.
+
+use std::fmt;
+use std::fmt::Display;
+
+use serde::Serialize;
+
+use super::nats::NatsOptions;
+use mrol::console::parse;
+use mrol::console::{CliError, Output};
+use mrol_cluster::{NodeBeat, Overview};
+use mrol_service::replication::NodeName;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol cluster forget n3 --nats nats://10.0.0.1:4222     machine n3 is gone, and does not come back
+
+A node that is silent may come back with changes that no other has, so the cluster remembers it, and the maps that were deleted
+meanwhile. Forget a node once its data folder is gone or is to be wiped. Started again under its name it is a node like any other.";
+
+/// Take a node that left for good off the list of nodes
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Forget {
+    /// The node, which does not beat any more
+    #[arg(value_name = "NODE", value_parser = parse::node_name)]
+    node: NodeName,
+    #[command(flatten)]
+    nats: NatsOptions,
+}
+
+impl Forget {
+    pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
+        let reader = self.nats.reader()?;
+        check_silent(&reader.settled().map_err(CliError::failed)?, &self.node)?;
+        let beats = reader.store().beats.read().map_err(CliError::failed)?;
+        // The one that was looked at last: where the node has beaten meanwhile, nothing is removed.
+        let last: Option<NodeBeat> = beats.into_iter().find(|beat| beat.node == self.node);
+        if let Some(last) = last {
+            reader.store().beats.remove(&last).map_err(CliError::failed)?;
+        }
+        output.print(&Forgotten { node: self.node.to_string() })
+    }
+}
+
+/// Refuses a node that nobody has heard of, and one that is live.
+fn check_silent(seen: &Overview, node: &NodeName) -> Result<(), CliError> {
+    match seen.node(node) {
+        None => {
+            let nodes: Vec<_> = seen.nodes.iter().map(|seen| seen.node.to_string()).collect();
+            let nodes = if nodes.is_empty() { "none".to_owned() } else { nodes.join(", ") };
+            Err(CliError::failed(format!("node {node} is none of the cluster's, which are: {nodes}")))
+        }
+        Some(seen) if seen.is_live => Err(CliError::failed(format!(
+            "node {node} is live, at {}: a node is forgotten once it has ended for good",
+            seen.beat.grpc
+        ))),
+        Some(_) => Ok(()),
+    }
+}
+
+#[derive(Serialize)]
+struct Forgotten {
+    node: String,
+}
+
+impl Display for Forgotten {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "node {} is forgotten", self.node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use mrol_cluster::{Beat, SeenNode};
+
+    use super::*;
+
+    #[test]
+    fn only_a_node_that_is_there_no_more_is_forgotten() {
+        let seen = |name: &str, is_live| SeenNode {
+            node: NodeName::new(name).unwrap(),
+            is_live,
+            beat: Beat {
+                http: String::new(),
+                grpc: "http://10.0.0.1:7334".to_owned(),
+                version: String::new(),
+                record_version: 1,
+                maps: BTreeMap::new(),
+                free_bytes: 0,
+                has_ended: !is_live,
+            },
+        };
+        let seen = Overview { nodes: vec![seen("n1", true), seen("n2", false)], maps: Vec::new() };
+        let refused = |name: &str| {
+            check_silent(&seen, &NodeName::new(name).unwrap()).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused("n2"), Ok(()));
+        assert!(refused("n1").unwrap_err().contains("node n1 is live, at http://10.0.0.1:7334"));
+        assert_eq!(refused("n9").unwrap_err(), "node n9 is none of the cluster's, which are: n1, n2");
+    }
+}
