@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use mrol_cluster::{
-    Credentials, EngineSettings, Forwarder, ForwarderSettings, Node, NodeCertificate, NodeSettings,
+    BaseLimits, Credentials, EngineSettings, Forwarder, ForwarderSettings, Node, NodeCertificate,
+    NodeSettings,
 };
 use mrol_service::{Cluster, MapService};
 use mrol_store::JOURNAL_VERSION;
@@ -73,6 +74,7 @@ impl Membership {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             record_version: JOURNAL_VERSION,
             engine: engine_settings(cluster, name.as_str()),
+            bases: BaseLimits::default(),
             name,
         };
         let (node, lag_max) = (Node::new(settings, forwarder), cluster.lag_max());

@@ -44,7 +44,7 @@ fn figures_of_a_cluster() {
     site.runtime().block_on(client.create_map(&map, new_map)).unwrap();
     let leader = site.leader(&map);
     let follower = (leader + 1) % NODES;
-    let server = site.start_alone();
+    let server = site.start_beside();
     let alone = Measured { client: site.client(&server.grpc), process: server.id() };
     site.runtime().block_on(alone.client.create_map(&map, new_map)).unwrap();
     let measured =

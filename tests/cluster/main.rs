@@ -16,6 +16,7 @@ mod link;
 mod load;
 #[expect(dead_code, reason = "the tests of the log use more of it")]
 mod nats;
+mod released;
 mod site;
 
 use std::time::{Duration, Instant};

@@ -8,8 +8,10 @@ use std::time::{Duration, Instant};
 
 use mrol::client::{Client, NewMap};
 use mrol::map::{ContentHash, MapName};
+use mrol::service::MapInfo;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
+use uuid::Uuid;
 
 use crate::link::Link;
 use crate::nats::NatsServers;
@@ -70,42 +72,41 @@ impl Site {
         }
         let urls: Vec<_> =
             node.to_nats.iter().map(|link| format!("nats://127.0.0.1:{}", link.port())).collect();
-        let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+        let mut command = serve(&data, [node.http, node.grpc], &log);
         command
-            .args(["serve", "--log-level", "info,mrol::audit=off", "--data-dir", data.to_str().unwrap()])
-            .args(["--http-listen", &format!("127.0.0.1:{}", node.http)])
-            .args(["--grpc-listen", &format!("127.0.0.1:{}", node.grpc)])
             .args(["--cluster", &urls.join(","), "--node", &format!("n{index}")])
-            .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()))
-            .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
             // A small disk is to be filled.
             .env("MROL_LIMITS__DISK_FREE_LOW_MIB", "4")
             .env("MROL_LIMITS__DISK_FREE_RESUME_MIB", "8")
-            .stdout(Stdio::null())
-            .stderr(log);
+            .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()));
         node.from_others.open();
         node.process = Some(command.spawn().unwrap());
     }
 
     /// Starts a server by itself, whose data folder is beside those of the nodes.
-    pub(crate) fn start_alone(&self) -> Alone {
+    pub(crate) fn start_beside(&self) -> Alone {
         let [http, grpc] = free_ports();
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
-        command
-            .args(["serve", "--log-level", "warn", "--data-dir"])
-            .arg(self.folder.path().join("alone"))
-            .args(["--http-listen", &format!("127.0.0.1:{http}")])
-            .args(["--grpc-listen", &format!("127.0.0.1:{grpc}")])
-            .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
-            .env("MROL_LOG__AUDIT", "false")
-            .stdout(Stdio::null());
-        Alone { process: command.spawn().unwrap(), grpc: format!("http://127.0.0.1:{grpc}") }
+        let (data, log) = (self.folder.path().join("alone"), self.folder.path().join("alone.log"));
+        let process = serve(&data, [http, grpc], &log).spawn().unwrap();
+        Alone { process, grpc: format!("http://127.0.0.1:{grpc}") }
     }
 
     /// The process of a node that runs.
     pub(crate) fn process(&self, index: usize) -> u32 {
         self.nodes[index].process.as_ref().unwrap().id()
+    }
+
+    /// Starts a server by itself on the folder and the ports of a node that does not run.
+    pub(crate) fn start_alone(&mut self, index: usize, options: &[&str]) {
+        let (data, log) = (self.data(index), self.folder.path().join(format!("{index}.log")));
+        let node = &mut self.nodes[index];
+        assert!(node.process.is_none());
+        node.process = Some(serve(&data, [node.http, node.grpc], &log).args(options).spawn().unwrap());
+    }
+
+    /// Waits until a process ends by itself: whether it did what it was asked.
+    pub(crate) fn has_succeeded(&mut self, index: usize) -> bool {
+        self.nodes[index].process.take().unwrap().wait().unwrap().success()
     }
 
     /// Kills a node with -9.
@@ -206,12 +207,7 @@ impl Site {
     pub(crate) fn state(&self, index: usize, map: &MapName) -> Option<MapState> {
         let client = self.runtime.block_on(Client::connect(&self.grpc(index))).ok()?;
         let info = self.runtime.block_on(client.map_info(map)).ok()?;
-        Some(MapState {
-            revision: info.version.revision,
-            hash: info.version.content_hash,
-            scans: info.scans,
-            voxels: info.levels[0].voxels,
-        })
+        Some(MapState::of(&info))
     }
 
     /// The node that leads a map, by its log's own words: the last that said so.
@@ -270,10 +266,23 @@ impl Drop for Alone {
 /// How a node has a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MapState {
+    pub(crate) uuid: Uuid,
     pub(crate) revision: u64,
     pub(crate) hash: Option<ContentHash>,
     pub(crate) scans: usize,
     pub(crate) voxels: usize,
+}
+
+impl MapState {
+    pub(crate) fn of(info: &MapInfo) -> Self {
+        Self {
+            uuid: info.version.map_uuid,
+            revision: info.version.revision,
+            hash: info.version.content_hash,
+            scans: info.scans,
+            voxels: info.levels[0].voxels,
+        }
+    }
 }
 
 /// A disk of a test: a small file system in memory, which can be filled. Mounting takes root.
@@ -305,6 +314,19 @@ impl Drop for SmallDisk {
     fn drop(&mut self) {
         _ = Command::new("umount").arg("-l").arg(&self.0).status();
     }
+}
+
+/// A daemon, which says to `log` what it does.
+fn serve(data: &Path, [http, grpc]: [u16; 2], log: &Path) -> Command {
+    let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    command
+        .args(["serve", "--log-level", "info,mrol::audit=off", "--data-dir", data.to_str().unwrap()])
+        .args(["--http-listen", &format!("127.0.0.1:{http}"), "--grpc-listen", &format!("127.0.0.1:{grpc}")])
+        .env("MROL_STORE__SNAPSHOT_INTERVAL_S", "5")
+        .stdout(Stdio::null())
+        .stderr(log);
+    command
 }
 
 fn free_ports() -> [u16; 2] {

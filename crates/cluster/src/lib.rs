@@ -41,6 +41,6 @@ pub use following::Following;
 pub use forwarder::{Forwarder, ForwarderError, ForwarderSettings, NodeCertificate};
 pub use jetstream_log::{FRAMES_MAX, JetStreamLog, News};
 pub use liveness::Liveness;
-pub use node::{Node, NodeSettings, NodeStatus};
+pub use node::{BaseLimits, Node, NodeSettings, NodeStatus};
 pub use overview::{MapCopy, Overview, OverviewError, OverviewReader, SeenMap, SeenNode};
 pub use store::{ClusterStore, EnterError, NoStore, StreamCopies};

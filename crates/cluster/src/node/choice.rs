@@ -53,12 +53,12 @@ pub(super) struct Known<'a> {
 /// by the log. It is made so that one claims as a rule, and soon.
 pub(super) fn choose(known: &Known<'_>) -> Choice {
     match known.lead {
-        Lead::Shared { is_here: true, .. } => {
-            match known.wished.filter(|wished| can_take_over(known, wished)) {
-                Some(wished) => Choice::HandOver(wished.clone()),
-                None => Choice::Stay,
-            }
-        }
+        Lead::Shared { is_here: true, .. } => match successor(known) {
+            Some(node) => Choice::HandOver(node.clone()),
+            None => Choice::Stay,
+        },
+        // Before it has seen the others, it does not know what they read.
+        _ if known.view.beats == 0 => Choice::Stay,
         Lead::Shared { has_claimed: true, claim, .. } => match furthest(known) {
             Some(node) => Choice::HandOver(node.clone()),
             None if all_have_heard(known, *claim) => Choice::Open(*claim),
@@ -66,10 +66,24 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
         },
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
         // What it would write, not all could read: nodes are exchanged one by one.
-        Lead::Shared { .. } if known.view.reads_least() < known.record_version => Choice::Stay,
+        Lead::Shared { .. } if known.view.reads_least(known.map) < known.record_version => Choice::Stay,
         Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
         _ => Choice::Stay,
     }
+}
+
+/// The node that is to lead in the place of this one: the one that is wished, and where a live node cannot read what this
+/// one writes, any whose records all can read, the furthest first.
+fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
+    let Known { view, map, .. } = *known;
+    let read_by_all = view.reads_least(map).min(known.record_version);
+    let may_lead = |node: &NodeName| view.writes(node) <= read_by_all && can_take_over(known, node);
+    let wished = known.wished.filter(|wished| may_lead(wished));
+    if wished.is_some() || read_by_all == known.record_version {
+        return wished;
+    }
+    let rank = |(node, head): &(&NodeName, &MapHead)| (head.sequence, std::cmp::Reverse((*node).clone()));
+    view.holders(map).filter(|(node, _)| may_lead(node)).max_by_key(rank).map(|(node, _)| node)
 }
 
 /// True where another node leads, or may be about to. One that the log names and that does not take over is not waited
@@ -227,25 +241,54 @@ mod tests {
         assert_eq!(chosen(&lead, &[("a", true, Some(5), true)], PATIENCE, None), Choice::Claim);
     }
 
-    #[test]
-    fn who_writes_what_another_cannot_read_does_not_lead() {
-        let (own, gone) = (node("b"), ("a", false, Some(5), false));
-        let view = view(&[gone, ("c", true, Some(5), false)]);
-        let lead = led_by(Some("a"), false);
-        let known = |record_version| Known {
+    /// What `b` at revision 5 does, which writes records of a newer version than the others, or the same.
+    fn chosen_by(record_version: u32, lead: &Lead, view: &View, wished: Option<&str>) -> Choice {
+        let (own, wished) = (node("b"), wished.map(node));
+        let wished = wished.as_ref();
+        let (map, revision, sequence_before, waited) = (MAP, 5, 5, PATIENCE);
+        choose(&Known {
             own: &own,
-            map: MAP,
-            revision: 5,
-            sequence_before: 5,
-            lead: &lead,
-            wished: None,
-            view: &view,
-            waited: PATIENCE,
+            map,
+            revision,
+            sequence_before,
+            lead,
+            wished,
+            view,
+            waited,
             claimed_at: None,
             record_version,
-        };
-        assert_eq!(choose(&known(7)), Choice::Claim);
-        assert_eq!(choose(&known(8)), Choice::Stay);
+        })
+    }
+
+    #[test]
+    fn who_writes_what_another_cannot_read_does_not_take_over() {
+        let gone = ("a", false, Some(5), false);
+        let lead = led_by(Some("a"), false);
+        let by = |record_version, others: &View| chosen_by(record_version, &lead, others, None);
+        let others = view(&[gone, ("c", true, Some(5), false)]);
+        assert_eq!(by(7, &others), Choice::Claim);
+        assert_eq!(by(8, &others), Choice::Stay);
+        assert_eq!(by(8, &view(&[gone, ("c", true, None, false)])), Choice::Stay, "it is loading the map");
+        assert_eq!(by(8, &view(&[gone, ("c", true, Some(5), true)])), Choice::Claim, "it has parted already");
+        let unseen = View { beats: 0, ..view(&[]) };
+        assert_eq!(by(8, &unseen), Choice::Stay, "who is there is not known yet");
+    }
+
+    #[test]
+    fn who_writes_what_another_cannot_read_hands_over_to_one_that_all_can_read() {
+        let lead = led_by(Some("b"), true);
+        let older = |name, sequence, is_parted| (name, true, Some(sequence), is_parted);
+        let others = view(&[older("a", 5, false), older("c", 6, false)]);
+        assert_eq!(chosen_by(7, &lead, &others, None), Choice::Stay);
+        assert_eq!(chosen_by(8, &lead, &others, None), Choice::HandOver(node("c")), "it is furthest");
+        assert_eq!(chosen_by(8, &lead, &others, Some("a")), Choice::HandOver(node("a")));
+        assert_eq!(chosen_by(8, &lead, &view(&[older("a", 4, false)]), None), Choice::Stay, "it is behind");
+        assert_eq!(chosen_by(8, &lead, &view(&[older("a", 5, true)]), None), Choice::Stay, "it has parted");
+        // One that is wished, and that not all can read.
+        let mut others = view(&[older("a", 5, false), older("c", 5, false)]);
+        others.others.get_mut(&node("c")).unwrap().beat.record_version = 8;
+        assert_eq!(chosen_by(8, &lead, &others, Some("c")), Choice::HandOver(node("a")));
+        assert_eq!(chosen_by(7, &lead, &others, Some("c")), Choice::Stay);
     }
 
     #[test]

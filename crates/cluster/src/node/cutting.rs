@@ -1,7 +1,7 @@
 //! Puts a base, and cuts the front of a log off.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use mrol_map::map::MapName;
 use mrol_service::MapService;
@@ -9,34 +9,29 @@ use mrol_service::replication::Base;
 use uuid::Uuid;
 
 use super::blocking::blocking;
+use super::settings::BaseLimits;
 use crate::bases::BaseError;
 use crate::jetstream_log::JetStreamLog;
 use crate::store::ClusterStore;
-
-/// Bytes of a log behind its base after which a new base is put.
-const BYTES_MAX: u64 = 256 << 20;
-/// Messages likewise: each costs a NATS server 300 bytes of memory.
-const MESSAGES_MAX: u64 = 100_000;
-/// How often it is looked.
-const LOOKED_EVERY: Duration = Duration::from_secs(30);
 
 /// Puts bases for a map that this node leads.
 pub(super) struct Cutting {
     joined: ClusterStore,
     log: Arc<JetStreamLog>,
     map: Uuid,
+    limits: BaseLimits,
     looked: Instant,
 }
 
 impl Cutting {
-    pub(super) fn of(joined: ClusterStore, log: Arc<JetStreamLog>, map: Uuid) -> Self {
-        Self { joined, log, map, looked: Instant::now() }
+    pub(super) fn of(joined: ClusterStore, log: Arc<JetStreamLog>, map: Uuid, limits: BaseLimits) -> Self {
+        Self { joined, log, map, limits, looked: Instant::now() }
     }
 
     /// Puts a base where one is due, and cuts the log off at the one before: a node that loads that one just now goes
     /// on. `needed` is the first message that a live node has still to read.
     pub(super) async fn look(&mut self, service: &MapService, name: &MapName, needed: u64) {
-        if self.looked.elapsed() < LOOKED_EVERY {
+        if self.looked.elapsed() < self.limits.looked_every {
             return;
         }
         self.looked = Instant::now();
@@ -46,7 +41,7 @@ impl Cutting {
     }
 
     async fn cut_if_due(&self, service: &MapService, name: &MapName, needed: u64) -> Result<(), String> {
-        let (joined, log, map) = (self.joined.clone(), Arc::clone(&self.log), self.map);
+        let (joined, log, map, limits) = (self.joined.clone(), Arc::clone(&self.log), self.map, self.limits);
         let found = blocking(move || -> Result<_, String> {
             let before = joined.pointers.read(map).map_err(|error| error.to_string())?;
             let used = log.used().map_err(|error| error.to_string())?;
@@ -54,7 +49,7 @@ impl Cutting {
             // Of what is kept, the part behind the base, by its share of the messages.
             let behind = used.last_sequence.saturating_sub(base);
             let bytes = used.bytes.saturating_mul(behind) / used.messages.max(1);
-            Ok((before, behind >= MESSAGES_MAX || bytes >= BYTES_MAX))
+            Ok((before, behind >= limits.messages_max || bytes >= limits.bytes_max))
         });
         let (before, is_due) = found.await?;
         if !is_due {

@@ -16,6 +16,7 @@ use super::blocking::{blocking, no_quorum};
 use super::choice::{Choice, Known, choose};
 use super::cutting::Cutting;
 use super::heart::Pulse;
+use super::settings::BaseLimits;
 use super::view::View;
 use crate::following::Following;
 use crate::jetstream_log::JetStreamLog;
@@ -45,6 +46,8 @@ pub(super) struct Keeper {
     pub(super) node: NodeName,
     /// Version of the records that it writes.
     pub(super) record_version: u32,
+    /// When it puts a new base.
+    pub(super) bases: BaseLimits,
     pub(super) service: MapService,
     pub(super) joined: ClusterStore,
     pub(super) name: MapName,
@@ -58,12 +61,25 @@ pub(super) struct Keeper {
 }
 
 impl Keeper {
-    /// Keeps it until it is aborted.
+    /// Keeps it until it is aborted, or there is no copy any more.
     pub(super) async fn keep(mut self) {
+        loop {
+            let log = self.shared().await;
+            let _following = Following::begin(self.service.clone(), self.name.clone(), &log);
+            let Ok(lead) = self.service.lead_of(&self.name).await else { return };
+            match self.lead_where_due(lead, log).await {
+                Ended::Behind => tokio::time::sleep(PAUSE).await,
+                Ended::Gone => return,
+            }
+        }
+    }
+
+    /// Takes a copy in where there is none, and shares it by its log, again and again until that is done.
+    async fn shared(&self) -> Arc<JetStreamLog> {
         let mut last_said = None;
-        let log = loop {
+        loop {
             let error = match self.share().await {
-                Ok(log) => break log,
+                Ok(log) => return log,
                 Err(error) => error,
             };
             if last_said.as_ref() != Some(&error.message) {
@@ -71,10 +87,7 @@ impl Keeper {
                 last_said = Some(error.message);
             }
             tokio::time::sleep(PAUSE).await;
-        };
-        let _following = Following::begin(self.service.clone(), self.name.clone(), &log);
-        let Ok(lead) = self.service.lead_of(&self.name).await else { return };
-        self.lead_where_due(lead, log).await;
+        }
     }
 
     /// Takes a copy in where there is none, and shares it by its log.
@@ -131,15 +144,19 @@ impl Keeper {
         self.service.copy_map(self.name.clone(), uuid, Bytes::from(file), replace).await.map(drop)
     }
 
-    /// Looks with each beat, and whenever the log names another node, whether this one is to lead.
-    async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) {
-        let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid);
+    /// Looks with each beat, and whenever the log names another node, whether this one is to lead; until the copy is gone,
+    /// or the log begins behind what it has.
+    async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) -> Ended {
+        let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid, self.bases);
         let (mut waited_since, mut sequences, mut beats_then) = (None, [0; 2], 0);
         let (mut claimed, mut claim_told) = (Claimed::default(), None);
         loop {
             let view = self.view.borrow_and_update().clone();
             let now = lead.borrow_and_update().clone();
-            let Ok(version) = self.service.version_of(&self.name).await else { return };
+            let Ok(version) = self.service.version_of(&self.name).await else { return Ended::Gone };
+            if self.service.is_behind_log(&self.name).await.unwrap_or(false) {
+                return Ended::Behind;
+            }
             let leader_is_seen = match &now {
                 Lead::Shared { is_here: true, .. } => true,
                 Lead::Shared { leader: Some(leader), .. } => {
@@ -183,7 +200,7 @@ impl Keeper {
             tokio::select! {
                 changed = self.view.changed() => {
                     if changed.is_err() {
-                        return;
+                        return Ended::Gone;
                     }
                     let beats = self.view.borrow().beats;
                     let Lead::Shared { sequence, .. } = &*lead.borrow() else { continue };
@@ -247,6 +264,14 @@ impl Claimed {
     fn waits(&self, lead: &Lead) -> bool {
         matches!(lead, Lead::Shared { is_here: false, has_claimed: true, .. }) && self.looks < LOOKS_MAX
     }
+}
+
+/// Why a node ends looking whether it is to lead.
+enum Ended {
+    /// The copy is gone, or the node ends.
+    Gone,
+    /// The log begins behind what the copy has.
+    Behind,
 }
 
 /// Waits until there was a claim, or this node has taken over or lost the lead.

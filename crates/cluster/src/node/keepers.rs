@@ -16,7 +16,7 @@ use uuid::Uuid;
 use super::blocking::blocking;
 use super::heart::Pulse;
 use super::keeper::Keeper;
-use super::settings::NodeSettings;
+use super::settings::{BaseLimits, NodeSettings};
 use super::view::View;
 use crate::catalog::Listing;
 use crate::store::ClusterStore;
@@ -45,6 +45,7 @@ pub(super) struct Wish {
 pub(super) struct Keepers {
     node: NodeName,
     record_version: u32,
+    bases: BaseLimits,
     service: MapService,
     joined: ClusterStore,
     view: watch::Receiver<View>,
@@ -79,9 +80,21 @@ impl Keepers {
         pulse: std_mpsc::Sender<Pulse>,
         takeovers: Arc<AtomicU64>,
     ) -> Self {
-        let (node, record_version) = (settings.name.clone(), settings.record_version);
+        let NodeSettings { name: node, record_version, bases, .. } = settings.clone();
         let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
-        Self { node, record_version, service, joined, view, pulse, takeovers, kept, revision: 0, deleted }
+        Self {
+            node,
+            record_version,
+            bases,
+            service,
+            joined,
+            view,
+            pulse,
+            takeovers,
+            kept,
+            revision: 0,
+            deleted,
+        }
     }
 
     /// Reads the list with each beat, with each wish and whenever it was changed, until the wishes end.
@@ -170,6 +183,7 @@ impl Keepers {
         let keeper = Keeper {
             node: self.node.clone(),
             record_version: self.record_version,
+            bases: self.bases,
             service: self.service.clone(),
             joined: self.joined.clone(),
             name: name.clone(),

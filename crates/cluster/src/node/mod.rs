@@ -26,4 +26,4 @@ mod settings;
 mod view;
 
 pub use server::{Node, NodeStatus};
-pub use settings::NodeSettings;
+pub use settings::{BaseLimits, NodeSettings};

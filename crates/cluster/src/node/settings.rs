@@ -1,5 +1,7 @@
 //! What a node is made of.
 
+use std::time::Duration;
+
 use mrol_service::replication::NodeName;
 
 use crate::engine::EngineSettings;
@@ -19,4 +21,23 @@ pub struct NodeSettings {
     pub record_version: u32,
     /// How it reaches NATS.
     pub engine: EngineSettings,
+    /// When it puts a new base for a map that it leads.
+    pub bases: BaseLimits,
+}
+
+/// When a new base of a map is put, behind which the front of its log is cut off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BaseLimits {
+    /// Bytes of the log behind the base before.
+    pub bytes_max: u64,
+    /// Messages likewise: each costs a NATS server 300 bytes of memory.
+    pub messages_max: u64,
+    /// How often it is looked.
+    pub looked_every: Duration,
+}
+
+impl Default for BaseLimits {
+    fn default() -> Self {
+        Self { bytes_max: 256 << 20, messages_max: 100_000, looked_every: Duration::from_secs(30) }
+    }
 }

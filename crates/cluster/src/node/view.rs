@@ -43,10 +43,17 @@ impl View {
         })
     }
 
-    /// The least version of records that the other live nodes read.
-    pub(super) fn reads_least(&self) -> u32 {
+    /// The least version of records that the other live nodes read which follow a map, or are about to: one that has
+    /// parted from it reads none.
+    pub(super) fn reads_least(&self, map: Uuid) -> u32 {
         let live = self.others.values().filter(|seen| seen.is_live);
-        live.map(|seen| seen.beat.record_version).min().unwrap_or(u32::MAX)
+        let follow = live.filter(|seen| seen.beat.maps.get(&map).is_none_or(|head| !head.is_parted));
+        follow.map(|seen| seen.beat.record_version).min().unwrap_or(u32::MAX)
+    }
+
+    /// Version of the records that another node writes.
+    pub(super) fn writes(&self, node: &NodeName) -> u32 {
+        self.others.get(node).map_or(u32::MAX, |seen| seen.beat.record_version)
     }
 
     /// The furthest revision of each map at the others that are live and take changes of it.

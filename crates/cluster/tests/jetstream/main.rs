@@ -5,6 +5,10 @@ mod adopting;
 mod bases;
 mod beats;
 mod connecting;
+mod cutting;
+#[expect(dead_code, reason = "the tests of a whole site use more of it")]
+#[path = "../../../../tests/cluster/link.rs"]
+mod link;
 mod lost_servers;
 mod nodes;
 mod older_copies;
@@ -13,3 +17,4 @@ mod random_kills;
 mod reading;
 mod shared_maps;
 mod support;
+mod versions;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use mrol_cluster::{Forwarder, ForwarderSettings, Node, NodeSettings};
+use mrol_cluster::{BaseLimits, Forwarder, ForwarderSettings, Node, NodeSettings};
 use mrol_map::geometry::{Point, Pose};
 use mrol_map::map::{ContentHash, MapName, MapSettings, RobotName};
 use mrol_map::mapping::Guess;
@@ -38,16 +38,28 @@ fn forwarder(node: &str) -> Forwarder {
 
 impl Server {
     pub(crate) fn start(servers: &NatsServers, node: &str, folder: &Path) -> Self {
+        Self::start_with(servers, node, folder, |_| {})
+    }
+
+    /// One of which a test says more.
+    pub(crate) fn start_with(
+        servers: &NatsServers,
+        node: &str,
+        folder: &Path,
+        say: impl FnOnce(&mut NodeSettings),
+    ) -> Self {
         let port = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("http://{}", port.local_addr().unwrap());
-        let settings = NodeSettings {
+        let mut settings = NodeSettings {
             name: NodeName::new(node).unwrap(),
             http: address.clone(),
             grpc: address,
             version: "0".to_owned(),
             record_version: 1,
             engine: servers.settings(),
+            bases: BaseLimits::default(),
         };
+        say(&mut settings);
         let node = Node::new(settings, forwarder(node));
         let settings = ServiceSettings {
             data_dir: Some(folder.to_owned()),
@@ -266,6 +278,7 @@ fn a_server_by_itself_or_another_node_does_not_open_the_folder_of_a_node() {
                 grpc: String::new(),
                 version: String::new(),
                 record_version: 1,
+                bases: BaseLimits::default(),
                 engine: mrol_cluster::EngineSettings {
                     urls: Vec::new(),
                     credentials: mrol_cluster::Credentials::None,

@@ -17,6 +17,9 @@ pub(crate) enum Stop {
     Failed(String),
     /// Several nodes share the map, and this one has another history of it than their log.
     Diverged(String),
+    /// Several nodes share the map, and their log begins behind what this one has: a copy of the map as it is there is
+    /// to take its place.
+    Behind(String),
     /// The map was deleted.
     Deleted,
     /// Another has its name now.
@@ -36,7 +39,7 @@ impl Stop {
                 );
                 ServiceError::new(Reason::MapReadOnly, message)
             }
-            Self::Diverged(how) => {
+            Self::Diverged(how) | Self::Behind(how) => {
                 let message = format!("map {name} takes no changes on this node: {how}");
                 ServiceError::new(Reason::HistoriesDiffer, message)
             }

@@ -100,6 +100,14 @@ impl MapService {
         run_to_completion(async move { inner.catalog.delete(&reachable, &asker).await }).await.map(drop)
     }
 
+    /// True of a copy that takes no changes since the log begins behind what it has: a newer copy is to take its place.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn is_behind_log(&self, name: &MapName) -> Result<bool, ServiceError> {
+        Ok(self.map_here(name).await?.is_behind_log())
+    }
+
     /// The version of a map, as it is now.
     ///
     /// # Errors

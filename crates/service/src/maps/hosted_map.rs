@@ -277,7 +277,7 @@ impl HostedMap {
     /// Why the map takes no changes.
     pub(crate) fn failure(&self) -> Option<&str> {
         match self.commit_queue.stopped()? {
-            Stop::Failed(reason) | Stop::Diverged(reason) => Some(reason),
+            Stop::Failed(reason) | Stop::Diverged(reason) | Stop::Behind(reason) => Some(reason),
             Stop::Deleted | Stop::Replaced | Stop::Renamed => None,
         }
     }
@@ -285,6 +285,11 @@ impl HostedMap {
     /// True where it takes no changes since this node has another history of it than the log of several nodes.
     pub(crate) fn has_diverged(&self) -> bool {
         matches!(self.commit_queue.stopped(), Some(Stop::Diverged(_)))
+    }
+
+    /// True where it takes no changes since the log of several nodes begins behind what this one has.
+    pub(crate) fn is_behind_log(&self) -> bool {
+        matches!(self.commit_queue.stopped(), Some(Stop::Behind(_)))
     }
 
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.

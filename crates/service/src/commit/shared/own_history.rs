@@ -20,7 +20,9 @@ impl Worker {
         let Some(base) = self.member.as_ref().map(|member| member.base().clone()) else { return Ok(()) };
         let (own, revision) = (self.map.revision(), base.revision);
         if own < revision {
-            return Err(self.diverged(format!("it is at revision {own}, and the log begins at {revision}")));
+            let how = format!("it is at revision {own}, and the log begins at {revision}");
+            tracing::warn!(map = %self.name, how, "this node's copy is behind where the log begins");
+            return Err(self.stopped.get_or_init(|| Stop::Behind(how)).refusal(&self.name));
         }
         let state = self.published.recent.hashes_at(revision).map(|hashes| hashes.state);
         let by_state = state.zip(base.state).map(|(ours, theirs)| ours == theirs);
