@@ -12,6 +12,7 @@
 
 mod faults;
 mod figures;
+mod large;
 mod link;
 mod load;
 #[expect(dead_code, reason = "the tests of the log use more of it")]

@@ -14,7 +14,7 @@ use mrol::store::OpeningProgress;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::site::{MapState, NODES, Site, WITHIN};
+use crate::site::{MapState, NODES, Site, WITHIN, program};
 
 /// The node whose folder is one of a former release.
 const OWNER: usize = 2;
@@ -55,7 +55,7 @@ fn state_alone(site: &Site, folder: &Path) -> MapState {
 
 /// Adopts the maps of the owner's folder: the uuid of the only one.
 fn adopt(site: &Site) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    let mut command = Command::new(program());
     command.args(["cluster", "adopt", site.data(OWNER).to_str().unwrap(), "--json"]);
     let output = command.args(["--nats", &site.nats.urls().join(",")]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

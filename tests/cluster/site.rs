@@ -120,7 +120,7 @@ impl Site {
 
     /// Sends a node a signal, by its name.
     pub(crate) fn signal(&self, index: usize, name: &str) {
-        let id = self.nodes[index].process.as_ref().unwrap().id().to_string();
+        let id = self.process(index).to_string();
         assert!(Command::new("kill").args(["-s", name, &id]).status().unwrap().success());
     }
 
@@ -157,9 +157,19 @@ impl Site {
         all.join(",")
     }
 
+    /// The process of a node that runs.
+    pub(crate) fn process(&self, index: usize) -> u32 {
+        self.nodes[index].process.as_ref().unwrap().id()
+    }
+
+    /// What a node has said in its log.
+    pub(crate) fn all_log_of(&self, index: usize) -> String {
+        fs::read_to_string(self.folder.path().join(format!("{index}.log"))).unwrap_or_default()
+    }
+
     /// What the log of a node ends with.
     pub(crate) fn log_of(&self, index: usize) -> String {
-        let text = fs::read_to_string(self.folder.path().join(format!("{index}.log"))).unwrap_or_default();
+        let text = self.all_log_of(index);
         let lines: Vec<_> = text.lines().collect();
         lines[lines.len().saturating_sub(40)..].join("\n")
     }
@@ -215,7 +225,7 @@ impl Site {
         let begun = Instant::now();
         loop {
             let said = (0..NODES).filter_map(|node| {
-                let text = fs::read_to_string(self.folder.path().join(format!("{node}.log"))).ok()?;
+                let text = self.all_log_of(node);
                 let leads = |line: &&str| line.contains(" leads map=") && line.contains(map.as_str());
                 let epoch = |line: &str| line.split("epoch=").nth(1)?.split(' ').next()?.parse::<u64>().ok();
                 Some((text.lines().filter(leads).filter_map(epoch).max()?, node))
@@ -316,10 +326,16 @@ impl Drop for SmallDisk {
     }
 }
 
+/// The program of the nodes: that which is built with the tests, or another.
+pub(crate) fn program() -> PathBuf {
+    std::env::var_os("MROL_CLUSTER_PROGRAM")
+        .map_or_else(|| PathBuf::from(env!("CARGO_BIN_EXE_mrol")), PathBuf::from)
+}
+
 /// A daemon, which says to `log` what it does.
 fn serve(data: &Path, [http, grpc]: [u16; 2], log: &Path) -> Command {
     let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    let mut command = Command::new(program());
     command
         .args(["serve", "--log-level", "info,mrol::audit=off", "--data-dir", data.to_str().unwrap()])
         .args(["--http-listen", &format!("127.0.0.1:{http}"), "--grpc-listen", &format!("127.0.0.1:{grpc}")])

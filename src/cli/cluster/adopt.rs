@@ -21,8 +21,9 @@ EXAMPLES:
   mrol cluster adopt ./mrol-data --nats nats://10.0.0.1:4222,nats://10.0.0.2:4222
   mrol cluster adopt ./mrol-data --map office --map yard --config mrol.toml    these maps only
 
-No server may use the folder meanwhile. Each map keeps its uuid and its revisions; what is in the folder stays as it is. A map
-whose name another map of the cluster has is refused, and nothing is done then. Done again, it goes on where it was ended.";
+No server may use the folder meanwhile. Each map keeps its uuid and its revisions. A map whose name another map of the cluster has
+is refused, and nothing is done then. Done again, it goes on where it was ended. From then on the folder is for a node alone: a
+server by itself does not open it, unless it is started with --leave-cluster.";
 
 /// Take the maps of a data folder into the cluster, while no server uses the folder
 #[derive(Debug, clap::Args)]
@@ -46,7 +47,9 @@ impl Adopt {
             let folder = data_dir.display();
             return Err(CliError::usage(format!("{folder} is no data folder: it has no folder maps")));
         }
-        let of_service = ServiceSettings { data_dir: Some(data_dir.clone()), ..settings.service_settings() };
+        let data = Some(data_dir.clone());
+        let of_service =
+            ServiceSettings { data_dir: data, may_be_adopted: true, ..settings.service_settings() };
         let service = MapService::open(of_service, &OpeningProgress::default()).map_err(CliError::failed)?;
         let runtime = Runtime::new().map_err(CliError::failed)?;
         let maps = chosen(&service, &maps)?.into_iter().map(|name| {
@@ -57,6 +60,7 @@ impl Adopt {
         let store = ClusterStore::create(&engine_of(&settings)).map_err(not_made)?;
         let (listing, _) = store.catalog.read().map_err(CliError::failed)?;
         check_free(&listing, &maps)?;
+        service.note_adopted().map_err(CliError::failed)?;
         let output = output.with_bar_of(maps.len(), "maps");
         for (name, version) in maps {
             let put = match listing.map(&name) {
@@ -131,7 +135,7 @@ fn not_made(error: NoStore) -> CliError {
 fn next_step(data_dir: &Path, servers: &str) -> String {
     let (servers, folder) = (servers.replace(", ", ","), data_dir.display());
     format!(
-        "next: start the server of this folder as a node, and never by itself again, since its maps would get another history:\n  \
+        "next: start the server of this folder as a node:\n  \
          mrol serve --cluster {servers} --node NAME --data-dir {folder}"
     )
 }

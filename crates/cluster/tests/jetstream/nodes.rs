@@ -129,7 +129,7 @@ pub(crate) fn retried<T>(ask: impl Fn() -> Result<T, ServiceError>) -> T {
 }
 
 #[track_caller]
-pub(crate) fn waited(what: &str, is_so: impl Fn() -> bool) -> Duration {
+pub(crate) fn waited(what: &str, mut is_so: impl FnMut() -> bool) -> Duration {
     let begun = Instant::now();
     while !is_so() {
         assert!(begun.elapsed() < WITHIN, "{what}");

@@ -85,6 +85,15 @@ impl MapService {
         Ok(NewMap { uuid: map.uuid, base, file: file.bytes })
     }
 
+    /// From now on a server by itself does not open the data folder any more: a cluster adopts maps of it. A node does,
+    /// whichever is first, and [`ServiceSettings::may_be_adopted`](crate::ServiceSettings) opens it to adopt more.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn note_adopted(&self) -> Result<(), ServiceError> {
+        self.inner.catalog.note_adopted()
+    }
+
     /// Deletes a map on all nodes, or on this one where only this one has it; its last version here.
     pub(super) async fn delete_in(
         &self,

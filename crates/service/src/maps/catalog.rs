@@ -61,7 +61,7 @@ impl Catalog {
         let open = |path: &Path| DataDir::open(path, store.clone());
         let data_dir = data_dir.as_deref().map(open).transpose().map_err(not_stored)?;
         if let Some(data_dir) = &data_dir {
-            check_node(data_dir, settings.cluster.as_ref())?;
+            check_node(data_dir, settings)?;
         }
         let maps = data_dir.as_ref().map(|data_dir| find_all(data_dir, progress)).transpose()?;
         let maps = maps.unwrap_or_default();

@@ -1,27 +1,42 @@
 //! A data folder is of a server by itself, or of one node of a cluster.
 
+use super::catalog::Catalog;
 use super::opening::not_stored;
 use crate::cluster::Cluster;
 use crate::error::{Reason, ServiceError};
+use crate::settings::ServiceSettings;
 use mrol_store::DataDir;
 
 /// Refuses a folder that belongs to somebody else, and notes that it belongs to this node from now on. What a server
 /// changed by itself, or under the name of another node, would part the histories of its maps.
-pub(super) fn check_node(data_dir: &DataDir, cluster: Option<&Cluster>) -> Result<(), ServiceError> {
+pub(super) fn check_node(data_dir: &DataDir, settings: &ServiceSettings) -> Result<(), ServiceError> {
     let there = data_dir.node().map_err(not_stored)?;
-    let message = match (cluster, there) {
+    let message = match (settings.cluster.as_ref(), there.as_deref()) {
         (None, None) => return Ok(()),
-        (Some(cluster), None) => return data_dir.set_node(cluster.node.as_str()).map_err(not_stored),
-        (Some(cluster), Some(there)) if cluster.node.as_str() == there => return Ok(()),
+        (Some(Cluster { node, .. }), None | Some("")) => {
+            return data_dir.set_node(node.as_str()).map_err(not_stored);
+        }
+        (Some(Cluster { node, .. }), Some(there)) if node.as_str() == there => return Ok(()),
         (Some(Cluster { node, .. }), Some(there)) => {
             format!(
                 "the data folder belongs to node {there}: start with cluster.node = {there:?}, not \"{node}\""
             )
         }
+        (None, Some("")) if settings.may_be_adopted => return Ok(()),
+        (None, Some("")) => "maps of the data folder were adopted by a cluster: start with --cluster and --node, or take it out \
+                             of the cluster for good with --leave-cluster"
+            .to_owned(),
         (None, Some(there)) => format!(
             "the data folder belongs to node {there} of a cluster: start with --cluster, or take it out of the cluster for \
              good with --leave-cluster"
         ),
     };
     Err(ServiceError::new(Reason::BadSettings, message))
+}
+
+impl Catalog {
+    /// From now on a server by itself does not open the data folder: a cluster adopts maps of it.
+    pub(crate) fn note_adopted(&self) -> Result<(), ServiceError> {
+        self.data_dir.as_ref().map_or(Ok(()), |data_dir| data_dir.set_adopted().map_err(not_stored))
+    }
 }

@@ -128,7 +128,8 @@ impl DataDir {
         self.folder(&entry, first).inspect_err(|_| self.leave(&entry))
     }
 
-    /// Creates a map in the place of `old` under its name `name`; the old map is renamed to `kept`.
+    /// Creates a map in the place of `old` under its name `name`; the old map is renamed to `kept`. A newer state of the
+    /// same map would have the same folder: after a crash in between there is only the old one, under the name `kept`.
     ///
     /// # Errors
     /// When the system refuses; in memory, all is then as it was. Where undoing a part of it failed too, the next start
@@ -142,6 +143,11 @@ impl DataDir {
     ) -> Result<MapFolder, StoreError> {
         self.clear_leftovers()?;
         let new = Entry::folder_name(name, first.uuid);
+        if new == name_of(&old.path()) {
+            let there = old.path();
+            old.move_to(&self.maps.join(Entry::folder_name(kept, old.uuid())))?;
+            return self.create(name, first).inspect_err(|_| drop(old.move_to(&there)));
+        }
         let replacement =
             Replacement { old: name_of(&old.path()), kept: Entry::folder_name(kept, old.uuid()) };
         self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;

@@ -11,7 +11,8 @@ const FILE: &str = "node";
 
 impl DataDir {
     /// The node of a cluster that the folder belongs to; none of a server by itself. Its maps go on by the logs of the
-    /// cluster: a server that changed them by itself would give them another history.
+    /// cluster: a server that changed them by itself would give them another history. Empty where a cluster has adopted
+    /// maps of the folder, and no node has opened it since.
     ///
     /// # Errors
     /// When the folder or the file cannot be read.
@@ -31,6 +32,14 @@ impl DataDir {
     /// When the system refuses.
     pub fn set_node(&self, node: &str) -> Result<(), StoreError> {
         folder::replace(&*self.files, &self.node_mark(), format!("{node}\n").as_bytes())
+    }
+
+    /// From now on the folder belongs to whichever node opens it first: a cluster adopts maps of it.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn set_adopted(&self) -> Result<(), StoreError> {
+        self.set_node("")
     }
 
     /// From now on the folder belongs to a server by itself; it belonged to a node.
@@ -58,6 +67,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let open = || DataDir::open(folder.path(), StoreSettings::default()).unwrap();
         assert_eq!(open().node().unwrap(), None);
+        open().set_adopted().unwrap();
+        assert_eq!(open().node().unwrap().as_deref(), Some(""));
         open().set_node("n1").unwrap();
         assert_eq!(open().node().unwrap().as_deref(), Some("n1"));
         open().forget_node().unwrap();
