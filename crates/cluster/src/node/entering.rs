@@ -29,6 +29,10 @@ pub(super) struct Entering {
 const LOOKED_FOR: Duration = Duration::from_millis(200);
 /// How long a request waits for a copy of a map that another node has just made.
 const COPIED_WITHIN: Duration = Duration::from_secs(5);
+/// How long this node may take to do its part of what is decided, and how much longer for each megabyte of a map file,
+/// which it fetches, reads and writes.
+const DONE_WITHIN: Duration = Duration::from_secs(20);
+const LONGER_A_MEGABYTE: Duration = Duration::from_millis(500);
 
 impl Entering {
     pub(super) fn new(joined: Arc<OnceLock<ClusterStore>>, wishes: mpsc::UnboundedSender<Wish>) -> Self {
@@ -43,9 +47,15 @@ impl Entering {
     }
 
     /// Waits until this node has done its part of what is decided already.
-    async fn wait(&self, name: &MapName, uuid: Uuid, is_there: bool) -> Result<(), ServiceError> {
+    async fn wait(
+        &self,
+        name: &MapName,
+        uuid: Uuid,
+        is_there: bool,
+        within: Duration,
+    ) -> Result<(), ServiceError> {
         let (told, heard) = oneshot::channel();
-        let is_sent = self.wishes.send(Wish { name: name.clone(), uuid, is_there, told }).is_ok();
+        let is_sent = self.wishes.send(Wish { name: name.clone(), uuid, is_there, within, told }).is_ok();
         if is_sent && heard.await.is_ok() {
             return Ok(());
         }
@@ -76,6 +86,7 @@ impl Entering {
 
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
         let (joined, of, uuid) = (self.joined()?, name.clone(), new.uuid);
+        let within = DONE_WITHIN + LONGER_A_MEGABYTE * (new.file.len() >> 20) as u32;
         let entered = blocking(move || -> Result<Uuid, ServiceError> {
             joined.enter(&of, &new).map_err(|error| match error {
                 EnterError::NotPut(why) => no_quorum(&why),
@@ -83,7 +94,7 @@ impl Entering {
             })
         });
         let there = entered.await?;
-        self.wait(name, there, true).await?;
+        self.wait(name, there, true, within).await?;
         Ok(there == uuid)
     }
 
@@ -101,7 +112,7 @@ impl Entering {
             Ok(())
         });
         deleted.await?;
-        self.wait(name, uuid, false).await
+        self.wait(name, uuid, false, DONE_WITHIN).await
     }
 }
 
@@ -113,7 +124,7 @@ impl SharedCatalog for Entering {
     fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(async move {
             let Some(uuid) = self.listed(name).await? else { return Ok(false) };
-            let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true)).await;
+            let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true, COPIED_WITHIN)).await;
             Ok(waited.is_ok_and(|waited| waited.is_ok()))
         })
     }

@@ -21,8 +21,6 @@ use super::view::View;
 use crate::catalog::Listing;
 use crate::store::ClusterStore;
 
-/// How long a copy that an operation waits for may take to come or to go.
-const DONE_WITHIN: Duration = Duration::from_secs(20);
 /// How often it is looked for it.
 const LOOKED_EVERY: Duration = Duration::from_millis(10);
 /// How long after a hint the list is read again, and how often.
@@ -38,6 +36,8 @@ pub(super) struct Wish {
     pub(super) uuid: Uuid,
     /// True of a map that was entered, false of one that was deleted.
     pub(super) is_there: bool,
+    /// How long that may take.
+    pub(super) within: Duration,
     pub(super) told: oneshot::Sender<()>,
 }
 
@@ -239,7 +239,7 @@ impl Keepers {
 
 /// Waits for what an operation wishes; where it does not come in time, the operation hears nothing.
 async fn fulfil(service: MapService, wish: Wish) {
-    let until = Instant::now() + DONE_WITHIN;
+    let until = Instant::now() + wish.within;
     while Instant::now() < until && !wish.told.is_closed() {
         match is_fulfilled(&service, &wish).await {
             Ok(true) => {
