@@ -91,11 +91,6 @@ impl Site {
         Alone { process, grpc: format!("http://127.0.0.1:{grpc}") }
     }
 
-    /// The process of a node that runs.
-    pub(crate) fn process(&self, index: usize) -> u32 {
-        self.nodes[index].process.as_ref().unwrap().id()
-    }
-
     /// Starts a server by itself on the folder and the ports of a node that does not run.
     pub(crate) fn start_alone(&mut self, index: usize, options: &[&str]) {
         let (data, log) = (self.data(index), self.folder.path().join(format!("{index}.log")));
