@@ -169,6 +169,11 @@ impl Site {
         lines[lines.len().saturating_sub(40)..].join("\n")
     }
 
+    /// Prints what the logs of all nodes end with.
+    pub(crate) fn print_logs(&self) {
+        (0..NODES).for_each(|node| println!("--- node {node}\n{}", self.log_of(node)));
+    }
+
     /// Waits until a node says that it is ready.
     #[track_caller]
     pub(crate) fn wait_until_ready(&self, index: usize) {
@@ -243,7 +248,7 @@ impl Node {
 impl Drop for Site {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            (0..NODES).for_each(|node| eprintln!("--- node {node}\n{}", self.log_of(node)));
+            self.print_logs();
         }
         (0..NODES).for_each(|node| self.kill_node(node));
     }
