@@ -14,7 +14,7 @@ use mrol::console::Output;
 use mrol::console::parse;
 use mrol_client::{NewFilter, NewMap};
 use mrol_map::map::{MapName, MapOrigin};
-use mrol_service::{MapList, UnavailableMap};
+use mrol_service::{MapElsewhere, MapHolder, MapList, UnavailableMap};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -163,8 +163,8 @@ impl Maps {
 }
 
 async fn list(server: ServerOptions, output: Output) -> Result<(), CliError> {
-    let MapList { maps, unavailable } = server.connect().await?.list_maps().await?;
-    if maps.is_empty() && unavailable.is_empty() {
+    let MapList { maps, unavailable, elsewhere } = server.connect().await?.list_maps().await?;
+    if maps.is_empty() && unavailable.is_empty() && elsewhere.is_empty() {
         output.say("no maps yet: `mrol maps create NAME --resolution 0.05` makes one")?;
     }
     maps.iter().try_for_each(|info| {
@@ -174,7 +174,30 @@ async fn list(server: ServerOptions, output: Output) -> Result<(), CliError> {
             output.say(MapReport::line(info))
         }
     })?;
-    unavailable.into_iter().try_for_each(|map| output.print(&Unavailable::from(map)))
+    unavailable.into_iter().try_for_each(|map| output.print(&Unavailable::from(map)))?;
+    elsewhere.into_iter().try_for_each(|map| output.print(&Elsewhere::from(map)))
+}
+
+/// A map that other nodes of the cluster hold.
+#[derive(Serialize)]
+struct Elsewhere {
+    map: String,
+    /// The live nodes that hold it.
+    held_by: Vec<String>,
+}
+
+impl From<MapElsewhere> for Elsewhere {
+    fn from(MapElsewhere { name, holders }: MapElsewhere) -> Self {
+        let at = |MapHolder { node, grpc, .. }| format!("{node} ({grpc})");
+        Self { map: name.to_string(), held_by: holders.into_iter().map(at).collect() }
+    }
+}
+
+impl Display for Elsewhere {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let nodes = if self.held_by.is_empty() { "no live node".to_owned() } else { self.held_by.join(", ") };
+        write!(f, "{:<24} held by {nodes}", self.map)
+    }
 }
 
 /// A map that could not be opened.

@@ -22,6 +22,8 @@ EXAMPLES:
   mrol snapshot backup/ --map office --map lab
   mrol snapshot backup/ --server http://robot-7:7334
 
+Of a node of a cluster, --all takes the maps that other nodes hold from those.
+
 Each file is a map at one revision, with its trajectory and the ids that it has accepted; the server goes on working.
 A file is checked before it replaces an older one. Where the server has maps that it could not open, the command saves
 the others, names the missing ones, and fails. A key of scope read is enough. `mrol restore` restores maps, on this
@@ -81,8 +83,9 @@ impl TakeSnapshots {
         let client = self.server.connect().await?;
         let (names, unavailable) = match self.all || self.maps.is_empty() {
             true => {
-                let MapList { maps, unavailable } = client.list_maps().await?;
-                (maps.into_iter().map(|info| info.name).collect(), unavailable)
+                let MapList { maps, unavailable, elsewhere } = client.list_maps().await?;
+                let here = maps.into_iter().map(|info| info.name);
+                (here.chain(elsewhere.into_iter().map(|map| map.name)).collect(), unavailable)
             }
             false => (self.maps, Vec::new()),
         };

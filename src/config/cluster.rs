@@ -36,6 +36,9 @@ section! {
         nkey_file: Option<PathBuf> = None; none;
         /// On how many NATS servers each log is kept: 3 outlives the loss of one, 1 none. Counts when a map is made.
         replicas: u32 = 3; none, from 1, to 5.0;
+        /// How many nodes hold a map that is made at this one: itself, and those with the most room; 0 where all do.
+        /// Others send callers on to them. `mrol cluster copies` changes it for a map.
+        copies: u32 = 0; none, to 1000.0;
         /// How far behind the others a node may be with a map before `/readyz` says that it is not ready.
         lag_max_s: f64 = 5.0; s, from 0.1, to 3600.0;
     }

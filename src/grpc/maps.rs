@@ -44,7 +44,8 @@ impl Maps for Adapter {
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
         let service = service_of(&request).map_err(status_of)?;
         let (maps, unavailable) = (service.list_maps().await.map_err(status_of)?, service.unavailable_maps());
-        Ok(answered(MapList { maps, unavailable }.into()))
+        let elsewhere = service.maps_elsewhere();
+        Ok(answered(MapList { maps, unavailable, elsewhere }.into()))
     }
 
     async fn rename_map(

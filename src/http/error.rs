@@ -6,14 +6,14 @@
 
 use axum::Json;
 use axum::extract::Request;
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::access::Operation;
 use mrol_map::util::excerpt;
-use mrol_service::{ErrorCode, Reason, ServiceError};
+use mrol_service::{ErrorCode, MapHolder, Reason, ServiceError};
 
 /// A failed request.
 #[derive(Debug)]
@@ -37,16 +37,42 @@ pub(super) struct Problem {
     code: &'static str,
     /// Why it failed: a stable word for programs.
     reason: &'static str,
+    /// The nodes that hold the map, where this one does not: the first is the best.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    elsewhere: Vec<Holder>,
 }
 
+/// A node of a cluster that holds a map.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Holder {
+    /// The name of the node.
+    node: String,
+    /// Address of its HTTP.
+    http: String,
+    /// Address of its gRPC.
+    grpc: String,
+}
+
+impl From<MapHolder> for Holder {
+    fn from(MapHolder { node, http, grpc }: MapHolder) -> Self {
+        Self { node, http, grpc }
+    }
+}
+
+/// Address of HTTP to which an answer sends the caller on.
+#[derive(Debug, Clone)]
+struct SentOnTo(String);
+
 impl Problem {
-    fn of(status: StatusCode, ServiceError { reason, message, .. }: ServiceError) -> Self {
+    fn of(status: StatusCode, ServiceError { reason, message, holders, .. }: ServiceError) -> Self {
         Self {
             title: status.canonical_reason().unwrap_or_default(),
             status: status.as_u16(),
             detail: message,
             code: reason.code().as_str(),
             reason: reason.as_str(),
+            elsewhere: holders.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -85,7 +111,12 @@ fn status_of_code(code: ErrorCode) -> StatusCode {
 
 impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
-        Self { status: status_of(error.reason), error, allow: None }
+        let status = match status_of(error.reason) {
+            // Nobody can be sent on to an address that is not known.
+            StatusCode::TEMPORARY_REDIRECT if error.holders.is_empty() => status_of_code(error.code()),
+            status => status,
+        };
+        Self { status, error, allow: None }
     }
 }
 
@@ -93,9 +124,13 @@ impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
         let (reason, retry_after) = (self.error.reason, self.error.retry_after);
         let code = reason.code();
+        let sent_on_to = self.error.holders.first().map(|holder| SentOnTo(holder.http.clone()));
         let mut response = (self.status, Json(Problem::of(self.status, self.error))).into_response();
         response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
         response.extensions_mut().insert(reason);
+        if let Some(address) = sent_on_to {
+            response.extensions_mut().insert(address);
+        }
         let headers = response.headers_mut();
         if let Some(wait) = retry_after {
             headers.insert(header::RETRY_AFTER, (wait.as_secs_f64().ceil() as u64).into());
@@ -107,6 +142,15 @@ impl IntoResponse for HttpError {
             headers.insert(header::ALLOW, allow);
         }
         response
+    }
+}
+
+/// Names, in an answer to a request for `uri` that sends the caller on, the same path and query at the other address.
+pub(super) fn locate(response: &mut Response, uri: &Uri) {
+    let Some(SentOnTo(address)) = response.extensions().get::<SentOnTo>() else { return };
+    let path = uri.path_and_query().map_or("/", |path| path.as_str());
+    if let Ok(location) = HeaderValue::try_from(format!("{address}{path}")) {
+        response.headers_mut().insert(header::LOCATION, location);
     }
 }
 
@@ -146,4 +190,41 @@ pub(super) fn no_such_method(request: &Request, route: &str) -> HttpError {
     let message = format!("{} does not take {}", excerpt(request.uri().path()), request.method());
     let error = HttpError::from(ServiceError::new(Reason::MethodNotAllowed, message));
     HttpError { allow: Some(methods.join(",")), ..error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mrol_map::map::MapName;
+
+    fn answered(holders: &[&str]) -> Response {
+        let holder = |at: &&str| MapHolder {
+            node: "b".to_owned(),
+            http: format!("http://{at}:7333"),
+            grpc: format!("http://{at}:7334"),
+        };
+        let map = MapName::new("hall").unwrap();
+        let error = ServiceError::map_elsewhere(&map, holders.iter().map(holder).collect());
+        let mut response = HttpError::from(error).into_response();
+        let uri = "http://a:7333/v1/maps/hall/voxels?level=1&limit=2".parse().unwrap();
+        locate(&mut response, &uri);
+        response
+    }
+
+    #[test]
+    fn who_is_sent_on_is_sent_to_the_same_path_and_query() {
+        let response = answered(&["b", "c"]);
+        assert_eq!(response.status(), 307);
+        let location = response.headers().get(header::LOCATION).unwrap();
+        assert_eq!(location, "http://b:7333/v1/maps/hall/voxels?level=1&limit=2");
+    }
+
+    #[test]
+    fn where_nobody_is_known_nobody_is_sent_on() {
+        let response = answered(&[]);
+        assert_eq!(
+            (response.status(), response.headers().get(header::LOCATION)),
+            (StatusCode::SERVICE_UNAVAILABLE, None)
+        );
+    }
 }

@@ -45,7 +45,10 @@ impl Protocol for Http {
     }
 
     async fn handle(&self, request: Request, next: Next) -> Result<Response, ServiceError> {
-        Ok(next.run(request).await)
+        let uri = request.uri().clone();
+        let mut response = next.run(request).await;
+        error::locate(&mut response, &uri);
+        Ok(response)
     }
 
     fn outcome(&self, response: &Response) -> RequestOutcome {

@@ -73,6 +73,7 @@ impl Membership {
             grpc: advertised("cluster.grpc", cluster.grpc.as_ref(), grpc, is_secured)?,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             record_version: JOURNAL_VERSION,
+            copies: cluster.copies as usize,
             engine: engine_settings(cluster, name.as_str()),
             bases: BaseLimits::default(),
             name,

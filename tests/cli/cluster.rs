@@ -10,7 +10,7 @@ const NOBODY: &str = "nats://127.0.0.1:9";
 
 #[test]
 fn every_command_explains_itself_with_examples() {
-    for command in ["status", "check", "move", "adopt", "keep", "forget", "config"] {
+    for command in ["status", "check", "move", "copies", "adopt", "keep", "forget", "config"] {
         let help = mrol(&["cluster", command, "--help"]).assert().success().get_output().stdout.clone();
         let help = String::from_utf8(help).unwrap();
         let example = format!("EXAMPLES:\n  mrol cluster {command} ");
@@ -23,10 +23,11 @@ fn a_command_that_cannot_reach_nats_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().to_str().unwrap();
     std::fs::create_dir(folder.path().join("maps")).unwrap();
-    let commands: [&[&str]; 6] = [
+    let commands: [&[&str]; 7] = [
         &["status"],
         &["check"],
         &["move", "office", "n2"],
+        &["copies", "office", "n1,n2"],
         &["adopt", data],
         &["keep", "n2", "office"],
         &["forget", "n3"],
@@ -49,6 +50,8 @@ fn input_that_makes_no_sense_is_named_with_its_limit() {
         (&["move", "office"], &["NODE"]),
         (&["move", "office", "n2", "--any"], &["--any"]),
         (&["move", "office", "n2", "--wait", "soon"], &["--wait", "soon", "90s"]),
+        (&["copies", "office", "n1,N 2"], &["NODES", "N 2", "[a-z0-9][a-z0-9_-]{0,63}"]),
+        (&["copies", "office"], &["NODES"]),
         (&["keep", "n2", "office", "--out", "office.ply", "--nats", NOBODY], &["answered"]),
         (&["check", "--monitor", "https://a:8222"], &["--monitor", "https://a:8222", "http://HOST:PORT"]),
         (&["adopt", "/no-such-folder", "--nats", NOBODY], &["/no-such-folder is no data folder"]),

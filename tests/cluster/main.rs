@@ -10,6 +10,7 @@
 #![cfg(all(feature = "cluster", target_os = "linux"))]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+mod copies;
 mod faults;
 mod figures;
 mod large;
@@ -23,6 +24,7 @@ mod site;
 use std::time::{Duration, Instant};
 
 use mrol::map::MapName;
+use parking_lot::Mutex;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -48,9 +50,12 @@ fn seed() -> u64 {
 
 /// A time without an acknowledgment that nodes are asked about.
 const LONG: Duration = Duration::from_secs(20);
+/// The tests take the whole machine, one after the other.
+static TURN: Mutex<()> = Mutex::new(());
 
 #[test]
 fn no_acknowledged_change_is_lost_or_made_twice_whatever_fails() {
+    let _turn = TURN.lock();
     let Some(mut site) = Site::start() else { return };
     let map = MapName::new("hall").unwrap();
     site.create(&map);

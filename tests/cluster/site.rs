@@ -27,6 +27,8 @@ pub(crate) struct Site {
     folder: TempDir,
     nodes: Vec<Node>,
     runtime: Runtime,
+    /// Settings of all nodes besides.
+    settings: &'static [(&'static str, &'static str)],
 }
 
 struct Node {
@@ -42,6 +44,11 @@ struct Node {
 impl Site {
     /// A site with nodes that are ready; none where there is no program `nats-server`.
     pub(crate) fn start() -> Option<Self> {
+        Self::start_with(&[])
+    }
+
+    /// The same, with settings as variables.
+    pub(crate) fn start_with(settings: &'static [(&'static str, &'static str)]) -> Option<Self> {
         let nats = NatsServers::start_apart(NODES)?;
         let node = |_| {
             let [http, grpc] = free_ports();
@@ -50,8 +57,8 @@ impl Site {
         };
         let nodes = (0..NODES).map(node).collect();
         drop(nats.engine());
-        let mut site =
-            Self { nats, folder: TempDir::new().unwrap(), nodes, runtime: Runtime::new().unwrap() };
+        let (folder, runtime) = (TempDir::new().unwrap(), Runtime::new().unwrap());
+        let mut site = Self { nats, folder, nodes, runtime, settings };
         (0..NODES).for_each(|node| site.start_node(node));
         (0..NODES).for_each(|node| site.wait_until_ready(node));
         Some(site)
@@ -78,7 +85,8 @@ impl Site {
             // A small disk is to be filled.
             .env("MROL_LIMITS__DISK_FREE_LOW_MIB", "4")
             .env("MROL_LIMITS__DISK_FREE_RESUME_MIB", "8")
-            .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()));
+            .env("MROL_CLUSTER__GRPC", format!("http://127.0.0.1:{}", node.from_others.port()))
+            .envs(self.settings.iter().copied());
         node.from_others.open();
         node.process = Some(command.spawn().unwrap());
     }
@@ -144,6 +152,11 @@ impl Site {
     /// Address of gRPC of a node, as its clients reach it.
     pub(crate) fn grpc(&self, index: usize) -> String {
         format!("http://127.0.0.1:{}", self.nodes[index].grpc)
+    }
+
+    /// Address of HTTP of a node.
+    pub(crate) fn http(&self, index: usize) -> String {
+        format!("http://127.0.0.1:{}", self.nodes[index].http)
     }
 
     /// All of them, that of this node first.

@@ -10,6 +10,7 @@ use super::answers::Answers;
 use super::calls::Calls;
 use super::connection::Connection;
 use super::credentials::Credentials;
+use super::elsewhere::Elsewhere;
 use super::error::ClientError;
 use super::new_map::NewMap;
 use super::servers::Servers;
@@ -45,6 +46,10 @@ impl Client {
     /// outcome is unknown. A call tries each address once, and those whose connection was lost once more, within one
     /// deadline.
     ///
+    /// Where a server does not hold a map and names others that do, the call is sent on there, and so are later ones
+    /// about the map: twice at most, with the same key, and only to addresses with the scheme of those that are given
+    /// here. A stream of requests is not sent on; the next one goes there.
+    ///
     /// Questions that take a `min_revision` wait for the last revision that an answer about the map has named, so that
     /// the map never goes back; listings, blocks, trajectories and descriptions do not.
     ///
@@ -59,7 +64,15 @@ impl Client {
     /// # Errors
     /// When the address is not valid, no server answers there, or the two do not trust each other.
     pub async fn connect_with(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
-        Ok(Self { calls: Calls::new(Servers::connect(url, credentials).await?) })
+        let elsewhere = Elsewhere::of(url, credentials);
+        Ok(Self { calls: Calls::new(Servers::connect(url, credentials).await?, elsewhere) })
+    }
+
+    /// The same client, whose calls are sent on to no other server: a node that does not hold a map refuses
+    /// (`map_elsewhere`).
+    #[must_use]
+    pub fn not_sent_on(self) -> Self {
+        Self { calls: self.calls.not_sent_on() }
     }
 
     /// The underlying channel, without the key: for other services of the server, such as gRPC's health protocol.
@@ -100,7 +113,7 @@ impl Client {
     /// When the server refuses, or cannot be reached.
     pub async fn list_maps(&self) -> Result<MapList, ClientError> {
         let send = |on: Connection, request| async move { on.domain(on.maps().list_maps(request).await) };
-        self.calls.ask(pb::ListMapsRequest {}, send).await
+        self.calls.ask(None, pb::ListMapsRequest {}, send).await
     }
 
     /// Gives a map another name, which no map has; its uuid, its revision and its robots stay. Watches and changes that
@@ -124,7 +137,7 @@ impl Client {
             let answer = on.maps().delete_map(request).await;
             answer.map(|_| ()).map_err(|status| on.failure(&status))
         };
-        self.calls.change_of_none(message, send).await
+        self.calls.change_of_none(map, message, send).await
     }
 
     /// Returns the map as the bytes of a map file, at one revision.
@@ -142,7 +155,7 @@ impl Client {
             }
             Ok(file.freeze())
         };
-        self.calls.with_timeout(None).ask(message, read).await
+        self.calls.with_timeout(None).ask(Some(map), message, read).await
     }
 
     /// Creates a map from a map file. The map gets a new uuid.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tonic::{Code, Status};
 
-use crate::wire::{REASON, pb, retry_after};
+use crate::wire::{REASON, elsewhere, pb, retry_after};
 use mrol_service::ServiceError;
 
 /// Start of the TLS error for a server's certificate.
@@ -78,6 +78,9 @@ pub enum ClientError {
         message: String,
         /// When the same call may be answered otherwise, where the server tells.
         retry_after: Option<Duration>,
+        /// gRPC addresses of the servers that hold the map, where this one does not (`map_elsewhere`): the first is the
+        /// best.
+        elsewhere: Vec<String>,
     },
     /// The server's answer is not valid for this version of the client.
     #[error("the server's answer cannot be understood: {0}")]
@@ -122,17 +125,18 @@ impl ClientError {
             }
             (reason, code) => {
                 let (reason, message) = (reason.map(str::to_owned), message.to_owned());
-                Self::Refused { code, reason, message, retry_after: retry_after(status) }
+                let (retry_after, elsewhere) = (retry_after(status), elsewhere(status));
+                Self::Refused { code, reason, message, retry_after, elsewhere }
             }
         }
     }
 }
 
 impl From<pb::Failure> for ClientError {
-    fn from(pb::Failure { code, reason, message, retry_after_s }: pb::Failure) -> Self {
+    fn from(pb::Failure { code, reason, message, retry_after_s, elsewhere }: pb::Failure) -> Self {
         let reason = Some(reason).filter(|reason| !reason.is_empty());
         let retry_after = retry_after_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-        Self::Refused { code: Code::from_i32(code), reason, message, retry_after }
+        Self::Refused { code: Code::from_i32(code), reason, message, retry_after, elsewhere }
     }
 }
 
@@ -153,6 +157,8 @@ pub(super) fn root_cause(error: &dyn Error) -> String {
 mod tests {
     use super::*;
     use crate::wire::status_of;
+    use mrol_map::map::MapName;
+    use mrol_service::MapHolder;
 
     #[test]
     fn a_refusal_keeps_the_servers_message_and_word() {
@@ -174,6 +180,25 @@ mod tests {
         assert_eq!(told(ClientError::of("http://a", &status_of(refusal.clone()))), Some(wait));
         assert_eq!(told(pb::Failure::from(refusal).into()), Some(wait));
         assert_eq!(told(ClientError::of("http://a", &Status::not_found("no"))), None);
+    }
+
+    #[test]
+    fn a_refusal_keeps_where_the_map_is() {
+        let holder = |at: &str| MapHolder {
+            node: at.to_owned(),
+            http: format!("http://{at}:7333"),
+            grpc: format!("http://{at}:7334"),
+        };
+        let map = MapName::new("hall").unwrap();
+        let refusal = ServiceError::map_elsewhere(&map, vec![holder("b"), holder("c")]);
+        match ClientError::of("http://a", &status_of(refusal)) {
+            ClientError::Refused { reason, message, elsewhere, .. } => {
+                assert_eq!(reason.as_deref(), Some("map_elsewhere"));
+                assert_eq!(elsewhere, ["http://b:7334", "http://c:7334"]);
+                assert!(message.contains("node c (http://c:7333, gRPC http://c:7334)"), "{message}");
+            }
+            other => panic!("{other}"),
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ impl Client {
         let message = pb::ListEventsRequest::from((map, query));
         let send =
             |on: Connection, request| async move { on.domain(on.mapping().list_events(request).await) };
-        self.calls.ask(message, send).await
+        self.calls.ask(Some(map), message, send).await
     }
 
     /// Tells of the events that [`Client::list_events`] would return, then of each as it comes. It goes on until the
@@ -37,6 +37,6 @@ impl Client {
         let message = pb::WatchEventsRequest::from((map, query));
         let open =
             |on: Connection, request| async move { on.answers(on.mapping().watch_events(request).await) };
-        self.calls.with_timeout(None).ask(message, open).await
+        self.calls.with_timeout(None).ask(Some(map), message, open).await
     }
 }

@@ -15,8 +15,8 @@ use mrol_service::replication::NodeName;
 /// them for the secret of the cluster, which is the key of its [`Credentials`]: without that it says nothing to
 /// anybody.
 ///
-/// A call is sent once. Its error tells what was not sent ([`ClientError::Unreachable`]) from what was
-/// ([`ClientError::Lost`]).
+/// A call is sent once, and sent on to nobody. Its error tells what was not sent ([`ClientError::Unreachable`]) from
+/// what was ([`ClientError::Lost`]).
 #[derive(Debug, Clone)]
 pub struct NodeClient {
     connection: Connection,
@@ -42,7 +42,7 @@ impl NodeClient {
     /// A client whose calls are those of the holder of the key `caller`, or where no keys are asked for, of anybody.
     pub fn on_behalf_of(&self, caller: Option<&CallerName>) -> Client {
         let connection = self.connection.clone().forwarding(&self.node, caller);
-        Client { calls: Calls::new(Servers::One(connection)) }
+        Client { calls: Calls::new(Servers::One(connection), None) }
     }
 
     /// True once a call found the other node gone: it is to be connected to again.

@@ -42,9 +42,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<Collisions>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |check| pb::CheckPosesRequest::from((&name, check)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().check_poses_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().check_poses_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns of each group of spheres whether one meets a voxel, or which meets one first, or how much room there is,
@@ -74,9 +75,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<Collisions>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |check| pb::CheckSpheresRequest::from((&name, check)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().check_spheres_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().check_spheres_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns of each motion whether a body can make it, at the state that [`AtVersion::version`] names.
@@ -105,9 +107,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<Vec<MotionAnswer>>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |check| pb::CheckMotionsRequest::from((&name, check)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().check_motions_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().check_motions_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns what each ray meets first, at the state that [`AtVersion::version`] names.
@@ -136,9 +139,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<RayHits>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |rays| pb::CastRaysRequest::from((&name, rays)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().cast_rays_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().cast_rays_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns the occupied voxel that is nearest to each point, at the state that [`AtVersion::version`] names.
@@ -167,9 +171,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<NearestVoxels>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |points| pb::FindNearestRequest::from((&name, points)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().find_nearest_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().find_nearest_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns of each point whether it is occupied, free, or unknown, at the state that [`AtVersion::version`] names.
@@ -198,9 +203,10 @@ impl Client {
     ) -> Result<Answers<AtVersion<PointStates>>, ClientError> {
         let name = map.clone();
         let requests = batches.map(move |points| pb::ClassifyPointsRequest::from((&name, points)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().classify_points_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().classify_points_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 
     /// Returns the frontiers in a box, the largest first, each with a place from which it can be seen.

@@ -24,9 +24,11 @@ impl Client {
     ) -> Result<Answers<ScanAnswer>, ClientError> {
         let name = map.clone();
         let requests = scans.map(move |scan| pb::InsertScanRequest::from((&name, scan)));
-        let on = self.calls.connection_of_stream().await?;
-        let answers: Answers<Inserted> = on.answers(on.mapping().insert_scan_stream(requests).await)?;
-        Ok(self.calls.answers(map, Answers::new(answers.map(|inserted| inserted?.0))))
+        let on = self.calls.connection_of_stream(map).await?;
+        let answers: Result<Answers<Inserted>, _> =
+            on.answers(on.mapping().insert_scan_stream(requests).await);
+        let answers = answers.map(|answers| Answers::new(answers.map(|inserted| inserted?.0)));
+        self.calls.answers(map, answers)
     }
 
     /// Queries batch after batch, with one answer for each: [`Client::query_points`] without a round trip between two
@@ -41,9 +43,10 @@ impl Client {
     ) -> Result<Answers<PointAnswer>, ClientError> {
         let name = map.clone();
         let requests = queries.map(move |query| pb::QueryPointsRequest::from((&name, query)));
-        let (on, requests) = (self.calls.connection_of_stream().await?, self.calls.requests(map, requests));
-        let answers = on.answers(on.occupancy().query_points_stream(requests).await)?;
-        Ok(self.calls.answers(map, answers))
+        let (on, requests) =
+            (self.calls.connection_of_stream(map).await?, self.calls.requests(map, requests));
+        let answers = on.answers(on.occupancy().query_points_stream(requests).await);
+        self.calls.answers(map, answers)
     }
 }
 

@@ -23,7 +23,7 @@ impl Client {
     ) -> Result<Answers<WatchMessage>, ClientError> {
         let message = pb::WatchRequest::from((map, request));
         let open = |on: Connection, request| async move { on.answers(on.occupancy().watch(request).await) };
-        self.calls.with_timeout(None).ask(message, open).await
+        self.calls.with_timeout(None).ask(Some(map), message, open).await
     }
 
     /// Waits for one of several servers that has the revision from which a watch goes on: one that is behind would tell

@@ -33,7 +33,7 @@ pub use bases::{BaseError, BasePointers, BaseStore, Orphans};
 pub use beat::{Beat, MapHead};
 pub use beats::{BEAT_EVERY, Beats, NodeBeat};
 pub use bucket::{Bucket, BucketEntry, BucketError};
-pub use catalog::{Catalog, CatalogError, Hints, Listing, MapEntry};
+pub use catalog::{Catalog, CatalogError, Hints, Holders, Listing, MapEntry, Placement};
 pub use engine::{
     ConnectError, Credentials, Engine, EngineSettings, StreamError, StreamServers, StreamState,
 };

@@ -33,6 +33,8 @@ struct LastBeat {
     at: u64,
     /// True once the port refused since.
     is_refused: bool,
+    /// True where it is not the first that was seen of the node: the node beat since then.
+    is_later: bool,
 }
 
 impl Liveness {
@@ -60,8 +62,9 @@ impl Liveness {
         }
         let others = revisions.iter().filter(|(node, _)| **node != self.own);
         let last = |(node, &revision): (&NodeName, &u64)| {
-            let seen = self.others.get(node).filter(|last| last.revision == revision);
-            let new = LastBeat { revision, at: self.beats, is_refused: false };
+            let before = self.others.get(node);
+            let seen = before.filter(|last| last.revision == revision);
+            let new = LastBeat { revision, at: self.beats, is_refused: false, is_later: before.is_some() };
             (node.clone(), seen.copied().unwrap_or(new))
         };
         self.others = others.map(last).collect();
@@ -86,6 +89,11 @@ impl Liveness {
             let needed = if last.is_refused { OWN_BEATS_IF_REFUSED } else { OWN_BEATS };
             self.beats - last.at >= needed
         })
+    }
+
+    /// True once it is known of every other node whether it is gone: the others have beaten since they were seen first.
+    pub fn is_settled(&self) -> bool {
+        self.others.iter().all(|(node, last)| last.is_later || self.is_gone(node))
     }
 
     /// The other nodes that are not gone, in order of their names.
@@ -207,6 +215,22 @@ mod tests {
         assert!(!seen.liveness.is_gone(&node("c")) && seen.is_gone());
         (0..4).for_each(|_| seen.own_beat());
         assert!(seen.liveness.is_gone(&node("c")));
+    }
+
+    #[test]
+    fn nodes_that_were_there_before_are_known_to_be_live_once_they_beat_again_or_are_gone() {
+        let mut seen = Seen::new();
+        seen.bucket.insert(node("left"), 0);
+        seen.own_beat();
+        assert!(!seen.liveness.is_settled(), "nothing was heard of b and left since");
+        seen.beat("b");
+        seen.own_beat();
+        assert!(!seen.liveness.is_settled());
+        (0..4).for_each(|_| {
+            seen.beat("b");
+            seen.own_beat();
+        });
+        assert!(seen.liveness.is_settled() && seen.liveness.is_gone(&node("left")) && !seen.is_gone());
     }
 
     #[test]

@@ -160,5 +160,6 @@ fn not_answered(map: &HostedMap, leader: &NodeName) -> ServiceError {
 
 /// True of a refusal after which another node may lead, or this one: nothing was changed.
 pub(crate) fn leads_no_more(error: &ServiceError) -> bool {
-    matches!(error.reason, Reason::NotLeader | Reason::NoQuorum | Reason::Draining)
+    let reasons = [Reason::NotLeader, Reason::NoQuorum, Reason::Draining, Reason::MapElsewhere];
+    reasons.contains(&error.reason)
 }

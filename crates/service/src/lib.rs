@@ -43,7 +43,7 @@ mod work;
 pub use caller::{AllowedMaps, AllowedScans};
 pub use cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, SharedCatalog};
 pub use commit::Lead;
-pub use error::{ErrorCode, Reason, ReportedBy, ServiceError};
+pub use error::{ErrorCode, MapHolder, Reason, ReportedBy, ServiceError};
 pub use lifecycle::SharedMap;
 pub use limits::{Limits, Marks};
 pub use map_service::MapService;
@@ -56,12 +56,12 @@ pub use question::{
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
     Deletion, DeletionAnswer, DeletionTarget, EventMessage, EventsQuery, FailedScan, Foreground,
-    KeepOutAnswer, KeepOutList, LeftViewpoint, ListingRequest, MapFile, MapInfo, MapList, MapStorage,
-    MapVersion, MapsAwake, NotSeenSince, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan,
-    PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanEvent, ScanRequest,
-    StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer,
-    UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
-    WatchedViewpoint,
+    KeepOutAnswer, KeepOutList, LeftViewpoint, ListingRequest, MapElsewhere, MapFile, MapInfo, MapList,
+    MapStorage, MapVersion, MapsAwake, NotSeenSince, ObservedVoxel, ObserversAnswer, ObserversRequest,
+    ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanEvent,
+    ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo,
+    UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
+    WatchedSince, WatchedViewpoint,
 };
 pub use resources::{Gauges, MemoryReading, Readings, Shortage};
 pub use scan::{

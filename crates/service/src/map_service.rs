@@ -206,7 +206,7 @@ impl MapService {
     }
 
     /// The map of that name, which is opened where it sleeps. Where another node has just made it, waits for the copy
-    /// of this one.
+    /// of this one; where other nodes hold it, names those.
     pub(super) async fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
         let here = self.map_here(name).await;
         match (&here, &self.inner.settings.cluster) {

@@ -11,7 +11,7 @@ use tokio::runtime::Runtime;
 use super::nats::{NatsOptions, engine_of};
 use mrol::console::parse;
 use mrol::console::{CliError, Output, bytes};
-use mrol_cluster::{ClusterStore, Listing, NoStore, StreamError};
+use mrol_cluster::{ClusterStore, Holders, Listing, NoStore, StreamError};
 use mrol_map::map::MapName;
 use mrol_service::{MapService, MapVersion, NewMap, ServiceError, ServiceSettings};
 use mrol_store::OpeningProgress;
@@ -21,9 +21,10 @@ EXAMPLES:
   mrol cluster adopt ./mrol-data --nats nats://10.0.0.1:4222,nats://10.0.0.2:4222
   mrol cluster adopt ./mrol-data --map office --map yard --config mrol.toml    these maps only
 
-No server may use the folder meanwhile. Each map keeps its uuid and its revisions. A map whose name another map of the cluster has
-is refused, and nothing is done then. Done again, it goes on where it was ended. From then on the folder is for a node alone: a
-server by itself does not open it, unless it is started with --leave-cluster.";
+No server may use the folder meanwhile. Each map keeps its uuid and its revisions. All nodes hold the maps then, whatever
+cluster.copies says: `mrol cluster copies` changes that. A map whose name another map of the cluster has is refused, and nothing
+is done then. Done again, it goes on where it was ended. From then on the folder is for a node alone: a server by itself does not
+open it, unless it is started with --leave-cluster.";
 
 /// Take the maps of a data folder into the cluster, while no server uses the folder
 #[derive(Debug, clap::Args)]
@@ -114,7 +115,7 @@ fn entered(
         ))
     };
     let new = new.map_err(|error| failed(&error))?;
-    match store.enter(name, &new).map_err(|error| failed(&error))? {
+    match store.enter(name, &new, &Holders::All).map_err(|error| failed(&error))? {
         there if there == new.uuid => Ok(new.file.len()),
         other => Err(failed(&format!("another of that name was entered meanwhile, {other}"))),
     }

@@ -27,7 +27,8 @@ EXAMPLES:
 
 Takes a map file from the node's own copy, keeps it, deletes the map on all nodes and restores the file under the same name. What
 only other copies have is lost to the map, so look first (`mrol snapshot --server URL-OF-NODE`). The map begins anew: it has a new
-uuid, undo does not reach behind, and request ids of before mean nothing to it. Revisions and trajectories stay.";
+uuid, undo does not reach behind, and request ids of before mean nothing to it. Revisions and trajectories stay. It is held by
+the node and as many others as cluster.copies says there: `mrol cluster copies` changes that.";
 
 /// Where histories differ: make one node's copy the map, on all nodes
 #[derive(Debug, clap::Args)]
@@ -62,7 +63,7 @@ impl Keep {
         let seen = nats.reader()?.settled().map_err(CliError::failed)?;
         let server = address(&seen, &node, &map)?.to_owned();
         let runtime = Runtime::new().map_err(CliError::failed)?;
-        let client = runtime.block_on(Client::connect_with(&server, &credentials))?;
+        let client = runtime.block_on(Client::connect_with(&server, &credentials))?.not_sent_on();
         let file = runtime.block_on(client.snapshot_map(&map))?;
         let (path, revision) = keep_file(&file, &map, out)?;
         let shown = path.display();

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use super::known::{known_map, known_node};
 use super::nats::NatsOptions;
 use mrol::console::parse;
 use mrol::console::{CliError, Output};
@@ -66,20 +67,18 @@ impl MoveLead {
     }
 }
 
-/// Refuses a map that is not listed, and a node that nobody has heard of.
+/// Refuses a map that is not listed, and a node that nobody has heard of or that is not to hold the map.
 fn check_known(seen: &Overview, map: &MapName, node: Option<&NodeName>) -> Result<(), CliError> {
-    let listed = |names: Vec<String>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    if seen.map(map).is_none() {
-        let maps = listed(seen.maps.iter().map(|map| map.name.to_string()).collect());
-        return Err(CliError::failed(format!("map {map} is none of the cluster's, which are: {maps}")));
+    let of_map = known_map(seen, map)?;
+    let Some(node) = node else { return Ok(()) };
+    known_node(seen, node)?;
+    if !of_map.holders.contains(node) {
+        return Err(CliError::failed(format!(
+            "node {node} does not hold map {map}, which nodes {} hold: `mrol cluster copies {map} ...` changes that",
+            of_map.holders
+        )));
     }
-    match node.filter(|node| seen.node(node).is_none()) {
-        None => Ok(()),
-        Some(node) => {
-            let nodes = listed(seen.nodes.iter().map(|node| node.node.to_string()).collect());
-            Err(CliError::failed(format!("node {node} is none of the cluster's, which are: {nodes}")))
-        }
-    }
+    Ok(())
 }
 
 /// Waits until the beats say that the node leads, and says in which epoch.
@@ -156,7 +155,7 @@ impl Display for Moved {
 mod tests {
     use std::collections::BTreeMap;
 
-    use mrol_cluster::{Beat, MapCopy, MapHead, SeenMap, SeenNode};
+    use mrol_cluster::{Beat, Holders, MapCopy, MapHead, SeenMap, SeenNode};
     use uuid::Uuid;
 
     use super::*;
@@ -183,7 +182,8 @@ mod tests {
             is_live,
             beat: beat.clone(),
         };
-        let map = SeenMap { name: MapName::new("hall").unwrap(), uuid: Uuid::nil(), wished: None, copies };
+        let (name, uuid, holders) = (MapName::new("hall").unwrap(), Uuid::nil(), Holders::All);
+        let map = SeenMap { name, uuid, wished: None, holders, copies };
         Overview { nodes: nodes.iter().map(seen).collect(), maps: vec![map] }
     }
 
@@ -210,5 +210,9 @@ mod tests {
         assert_eq!(refused("hall", "a"), Ok(()));
         assert_eq!(refused("yard", "a").unwrap_err(), "map yard is none of the cluster's, which are: hall");
         assert_eq!(refused("hall", "z").unwrap_err(), "node z is none of the cluster's, which are: a");
+        let mut held = overview(&[a, ("b", true, None, false, false)]);
+        held.maps[0].holders = Holders::Only([NodeName::new("a").unwrap()].into());
+        let why = check_known(&held, &hall, Some(&b)).unwrap_err().to_string();
+        assert!(why.starts_with("node b does not hold map hall, which nodes a hold"), "{why}");
     }
 }

@@ -59,6 +59,8 @@ struct MapRow {
     map_uuid: String,
     leader: Option<String>,
     wished: Option<String>,
+    /// The nodes that are to hold it; none where all are.
+    nodes: Vec<String>,
     epoch: u64,
     revision: u64,
     copies: Vec<CopyRow>,
@@ -145,6 +147,7 @@ impl MapRow {
             map_uuid: map.uuid.to_string(),
             leader: map.leader().map(|copy| copy.node.to_string()),
             wished: map.wished.as_ref().map(ToString::to_string),
+            nodes: map.holders.names().map(ToString::to_string).collect(),
             epoch: map.copies.iter().map(|copy| copy.head.epoch).max().unwrap_or_default(),
             revision: map.furthest(),
             copies: map.copies.iter().map(copy).collect(),
@@ -157,6 +160,7 @@ impl MapRow {
             &self.map,
             self.leader.as_deref().unwrap_or("NONE"),
             self.wished.as_deref().unwrap_or("any"),
+            &if self.nodes.is_empty() { "all".to_owned() } else { self.nodes.join(",") },
             &self.epoch.to_string(),
             &self.revision.to_string(),
             &if copies.is_empty() { "no copies".to_owned() } else { copies.join(", ") },
@@ -181,7 +185,7 @@ impl Display for Report {
         let head = cells(["NODE", "STATE", "VERSION", "FREE", "GRPC", "HTTP"]);
         let nodes: Vec<_> = [head].into_iter().chain(self.nodes.iter().map(NodeRow::cells)).collect();
         writeln!(f, "{}\n", table(&nodes))?;
-        let head = cells(["MAP", "LEADER", "WISHED", "EPOCH", "REVISION", "COPIES", "UUID"]);
+        let head = cells(["MAP", "LEADER", "WISHED", "HELD BY", "EPOCH", "REVISION", "COPIES", "UUID"]);
         let maps: Vec<_> = [head].into_iter().chain(self.maps.iter().map(MapRow::cells)).collect();
         write!(f, "{}", table(&maps))?;
         let warnings = self.warnings();
@@ -217,6 +221,7 @@ mod tests {
             map_uuid: "u".into(),
             leader: leader.map(str::to_owned),
             wished: None,
+            nodes: Vec::new(),
             epoch: 3,
             revision: 20,
             copies,
@@ -234,8 +239,8 @@ mod tests {
             "a     live    0.2.0    3.00 GiB",
             "b     SILENT",
             "d     ended",
-            "hall  a       any     3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
-            "yard  NONE    any     3      20        no copies",
+            "hall  a       any     all      3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
+            "yard  NONE    any     all      3      20        no copies",
             "node b is SILENT: no beat within 3 s",
             "NO NODE LEADS map yard",
             "map hall: the copy of node c has PARTED",

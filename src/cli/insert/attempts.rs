@@ -10,8 +10,10 @@ use tonic::Code;
 const PAUSE_FIRST: Duration = Duration::from_millis(50);
 const PAUSE_MAX: Duration = Duration::from_secs(1);
 
-/// Reasons of refusals that are over soon. A refused scan changed nothing, so it may be sent again.
-const PASSING: [&str; 5] = ["overloaded", "starting", "draining", "catalog_busy", "body_stalled"];
+/// Reasons of refusals that are over soon. A refused scan changed nothing, so it may be sent again. A stream of scans
+/// is not sent on to a node that holds the map; the next one goes there.
+const PASSING: [&str; 6] =
+    ["overloaded", "starting", "draining", "catalog_busy", "body_stalled", "map_elsewhere"];
 
 /// True of a failure that may be over soon: a connection that broke, a server that restarts or is overloaded.
 pub(super) fn is_passing(error: &ClientError) -> bool {
@@ -85,6 +87,7 @@ mod tests {
             reason: reason.map(str::to_owned),
             message: String::new(),
             retry_after: None,
+            elsewhere: Vec::new(),
         };
         assert!(is_passing(&refused(Code::Unavailable, Some("draining"))));
         assert!(is_passing(&refused(Code::Unavailable, None)));

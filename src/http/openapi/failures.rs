@@ -30,7 +30,7 @@ pub(super) fn of(operation: Operation) -> BTreeSet<StatusCode> {
         statuses.extend([S::UNAUTHORIZED, S::FORBIDDEN]);
     }
     if route.path.contains('{') {
-        statuses.insert(S::NOT_FOUND);
+        statuses.extend([S::TEMPORARY_REDIRECT, S::NOT_FOUND]);
     }
     if matches!(route.method, "POST" | "PUT") {
         statuses.extend([S::REQUEST_TIMEOUT, S::PAYLOAD_TOO_LARGE, S::UNSUPPORTED_MEDIA_TYPE]);
@@ -99,6 +99,9 @@ fn header_of(status: StatusCode) -> Option<(&'static str, Header)> {
             .build()
     };
     match status {
+        StatusCode::TEMPORARY_REDIRECT => {
+            Some(("location", header(Type::String, "The same path and query at a node that holds the map")))
+        }
         StatusCode::UNAUTHORIZED => Some(("www-authenticate", header(Type::String, "`Bearer`"))),
         StatusCode::METHOD_NOT_ALLOWED => {
             Some(("allow", header(Type::String, "The methods that the path takes")))

@@ -5,7 +5,7 @@ use axum::response::{Json, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::error::HttpError;
+use crate::http::error::{Holder, HttpError};
 use crate::http::forms::FilterChoice;
 use crate::http::forms::body;
 use crate::http::forms::{Map, NoParams};
@@ -16,7 +16,7 @@ use crate::json::described;
 use mrol_client::wire::InField;
 use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{LEVELS_DEFAULT, MapName, MapOrigin, MapSettings};
-use mrol_service::UnavailableMap;
+use mrol_service::{MapElsewhere, UnavailableMap};
 
 /// The settings of a new map.
 #[derive(Deserialize, ToSchema)]
@@ -59,6 +59,25 @@ pub(crate) struct MapsResponse {
     #[schema(required = false)]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unavailable: Vec<UnavailableResponse>,
+    /// The maps that other nodes of the cluster hold, and this one does not.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    elsewhere: Vec<ElsewhereResponse>,
+}
+
+/// A map that other nodes of the cluster hold.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ElsewhereResponse {
+    /// The name of the map.
+    map: String,
+    /// Those of its holders that are live, the best first; none where none of them is.
+    holders: Vec<Holder>,
+}
+
+impl From<MapElsewhere> for ElsewhereResponse {
+    fn from(MapElsewhere { name, holders }: MapElsewhere) -> Self {
+        Self { map: name.to_string(), holders: holders.into_iter().map(Into::into).collect() }
+    }
 }
 
 /// A map that is not served as it should be.
@@ -131,10 +150,12 @@ const BYTES_PER_MAP: usize = 2048;
 )]
 pub(crate) async fn list(Service(service): Service, NoParams: NoParams) -> Result<Response, HttpError> {
     let (maps, unavailable) = (service.list_maps().await?, service.unavailable_maps());
-    let bytes = (maps.len() + unavailable.len()) * BYTES_PER_MAP;
+    let elsewhere = service.maps_elsewhere();
+    let bytes = (maps.len() + unavailable.len() + elsewhere.len()) * BYTES_PER_MAP;
     let listing = move || MapsResponse {
         maps: maps.into_iter().map(Into::into).collect(),
         unavailable: unavailable.into_iter().map(Into::into).collect(),
+        elsewhere: elsewhere.into_iter().map(Into::into).collect(),
     };
     pieces::whole(&service, bytes, listing).await
 }

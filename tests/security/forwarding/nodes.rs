@@ -17,7 +17,8 @@ use mrol::map::{CallerName, MapName, MapSettings};
 use mrol::middleware::Middleware;
 use mrol::service::replication::NodeName;
 use mrol::service::{
-    Cluster, Later, Lead, Limits, MapService, NewMap, Reason, ServiceError, ServiceSettings, SharedCatalog,
+    Cluster, Later, Lead, Limits, MapElsewhere, MapService, NewMap, Reason, ServiceError, ServiceSettings,
+    SharedCatalog,
 };
 use mrol::store::OpeningProgress;
 use mrol::telemetry::{Audit, Metrics, RequestRecorder};
@@ -162,6 +163,10 @@ impl SharedCatalog for NoCatalog {
 
     fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(std::future::ready(Ok(false)))
+    }
+
+    fn held_elsewhere(&self) -> Vec<MapElsewhere> {
+        Vec::new()
     }
 
     fn delete<'a>(&'a self, _: &'a MapName, _: Uuid) -> Later<'a, Result<(), ServiceError>> {

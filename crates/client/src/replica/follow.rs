@@ -182,8 +182,8 @@ mod tests {
     #[test]
     fn a_key_that_is_refused_is_told_from_a_server_that_is_away() {
         let refused = |code| {
-            let (reason, message, retry_after) = (None, String::new(), None);
-            refuses_key(&ClientError::Refused { code, reason, message, retry_after })
+            let (reason, message, retry_after, elsewhere) = (None, String::new(), None, Vec::new());
+            refuses_key(&ClientError::Refused { code, reason, message, retry_after, elsewhere })
         };
         assert!(refused(Code::Unauthenticated) && refused(Code::PermissionDenied));
         assert!(![Code::Unavailable, Code::NotFound, Code::ResourceExhausted].into_iter().any(refused));

@@ -68,7 +68,7 @@ impl From<&ScanEvent> for pb::ScanEvent {
 impl From<&FailedScan> for pb::Failure {
     fn from(FailedScan { reason, message }: &FailedScan) -> Self {
         let code = Reason::of_word(reason).map_or(tonic::Code::Unknown, |reason| status_code(reason.code()));
-        Self { code: code.into(), reason: reason.to_string(), message: message.clone(), retry_after_s: None }
+        Self { code: code.into(), reason: reason.to_string(), message: message.clone(), ..Default::default() }
     }
 }
 

@@ -9,7 +9,9 @@ use mrol_map::bloom::FilterSettings;
 use mrol_map::map::{FilterInfo, LEVELS_DEFAULT, LevelInfo, MapName, MapOrigin, MapSettings, RobotName};
 use mrol_map::mapping::Sighting;
 use mrol_map::util::Durations;
-use mrol_service::{MapInfo, MapList, MapStorage, Reason, ServiceError, UnavailableMap};
+use mrol_service::{
+    MapElsewhere, MapHolder, MapInfo, MapList, MapStorage, Reason, ServiceError, UnavailableMap,
+};
 use mrol_store::JournalUse;
 
 /// The name and settings of a map to make; `filter` fills in what the request leaves to the server.
@@ -119,11 +121,12 @@ impl TryFrom<pb::RestoreMapResponse> for MapInfo {
 }
 
 impl From<MapList> for pb::ListMapsResponse {
-    fn from(MapList { maps, unavailable }: MapList) -> Self {
+    fn from(MapList { maps, unavailable, elsewhere }: MapList) -> Self {
         let message = |UnavailableMap { name, reason }| pb::UnavailableMap { map: name.to_string(), reason };
         Self {
             maps: maps.into_iter().map(Into::into).collect(),
             unavailable: unavailable.into_iter().map(message).collect(),
+            elsewhere: elsewhere.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -132,10 +135,11 @@ impl TryFrom<pb::ListMapsResponse> for MapList {
     type Error = ServiceError;
 
     fn try_from(answer: pb::ListMapsResponse) -> Result<Self, ServiceError> {
-        let pb::ListMapsResponse { maps, unavailable } = answer;
+        let pb::ListMapsResponse { maps, unavailable, elsewhere } = answer;
         Ok(Self {
             maps: maps.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
             unavailable: unavailable.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            elsewhere: elsewhere.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -145,6 +149,22 @@ impl TryFrom<pb::UnavailableMap> for UnavailableMap {
 
     fn try_from(pb::UnavailableMap { map, reason }: pb::UnavailableMap) -> Result<Self, ServiceError> {
         Ok(Self { name: MapName::new(&map)?, reason })
+    }
+}
+
+impl From<MapElsewhere> for pb::MapElsewhere {
+    fn from(MapElsewhere { name, holders }: MapElsewhere) -> Self {
+        let message = |MapHolder { node, http, grpc }| pb::MapHolder { node, http, grpc };
+        Self { map: name.to_string(), holders: holders.into_iter().map(message).collect() }
+    }
+}
+
+impl TryFrom<pb::MapElsewhere> for MapElsewhere {
+    type Error = ServiceError;
+
+    fn try_from(pb::MapElsewhere { map, holders }: pb::MapElsewhere) -> Result<Self, ServiceError> {
+        let holder = |pb::MapHolder { node, http, grpc }| MapHolder { node, http, grpc };
+        Ok(Self { name: MapName::new(&map)?, holders: holders.into_iter().map(holder).collect() })
     }
 }
 

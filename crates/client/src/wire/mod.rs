@@ -27,7 +27,7 @@ mod values;
 mod watch;
 
 pub use codec::{IGNORED_MAX, LINKS_MAX};
-pub use failure::{REASON, retry_after, status_code, status_of};
+pub use failure::{REASON, elsewhere, retry_after, status_code, status_of};
 pub use forwarded::{CALLER, NODE};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::{create_map, nanoseconds};

@@ -12,6 +12,7 @@ use uuid::Uuid;
 
 use super::error::CatalogError;
 use super::hints::Hints;
+use super::holders::Holders;
 use super::listing::Listing;
 use crate::bucket::{Bucket, BucketError};
 use crate::engine::{Engine, StreamError};
@@ -63,15 +64,16 @@ impl Catalog {
         Ok((listing.map_err(|error| CatalogError::Damaged(error.to_string()))?, revision))
     }
 
-    /// Enters a map, and says which map has the name: this one, or another that had it before.
+    /// Enters a map that these nodes are to hold, and says which map has the name: this one, or another that had it
+    /// before.
     ///
     /// # Errors
     /// Says whether it may be there.
-    pub fn enter(&self, name: &MapName, uuid: Uuid) -> Result<Uuid, CatalogError> {
+    pub fn enter(&self, name: &MapName, uuid: Uuid, holders: &Holders) -> Result<Uuid, CatalogError> {
         self.change(|listing| match listing.check_place(name, uuid)? {
             Some(there) => Ok((there, false)),
             None => {
-                listing.enter(name, uuid);
+                listing.enter(name, uuid, holders);
                 Ok((uuid, true))
             }
         })
@@ -97,6 +99,17 @@ impl Catalog {
         self.change(|listing| {
             let is_so = listing.map(name).is_some_and(|entry| entry.leader().as_ref() == leader);
             Ok((is_so || listing.set_leader(name, leader), !is_so))
+        })
+    }
+
+    /// Says which nodes are to hold a map; false where there is no such map.
+    ///
+    /// # Errors
+    /// Says whether it may be changed.
+    pub fn set_holders(&self, name: &MapName, holders: &Holders) -> Result<bool, CatalogError> {
+        self.change(|listing| {
+            let is_so = listing.map(name).is_some_and(|entry| entry.holders() == *holders);
+            Ok((is_so || listing.set_holders(name, holders), !is_so))
         })
     }
 

@@ -28,7 +28,7 @@ pub(super) fn error_of(node: &NodeName, asked: Asked, error: ClientError) -> Ser
                 (Some(Reason::Deadline | Reason::CallerGone) | None, Asked::Change) => {
                     unknown(node, &message)
                 }
-                (Some(reason), _) => ServiceError { reason, message, retry_after },
+                (Some(reason), _) => ServiceError { retry_after, ..ServiceError::new(reason, message) },
                 (None, Asked::Question) => unanswered(node, &message),
             }
         }
@@ -90,7 +90,8 @@ mod tests {
 
     fn refused(reason: Option<&str>, code: tonic::Code) -> ClientError {
         let (reason, message) = (reason.map(str::to_owned), "no".to_owned());
-        ClientError::Refused { code, reason, message, retry_after: None }
+        let (retry_after, elsewhere) = (None, Vec::new());
+        ClientError::Refused { code, reason, message, retry_after, elsewhere }
     }
 
     #[test]
@@ -102,6 +103,7 @@ mod tests {
                 reason: Some(reason.as_str().to_owned()),
                 message: said.message.clone(),
                 retry_after: said.retry_after,
+                elsewhere: Vec::new(),
             };
             assert_eq!(told(Asked::Question, error.clone()), said);
             let of_change = told(Asked::Change, error);

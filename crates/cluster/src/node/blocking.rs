@@ -16,6 +16,11 @@ pub(super) async fn blocking<T: Send + 'static>(ask: impl FnOnce() -> T + Send +
 
 /// That NATS does not answer: nothing was changed.
 pub(super) fn no_quorum(why: &dyn std::fmt::Display) -> ServiceError {
-    let message = format!("NATS acknowledges nothing ({why}): nothing was changed, try again");
+    try_again(&format!("NATS acknowledges nothing ({why})"))
+}
+
+/// That a request comes too early, or while too many nodes are gone: nothing was changed.
+pub(super) fn try_again(why: &str) -> ServiceError {
+    let message = format!("{why}: nothing was changed, try again");
     ServiceError::new(Reason::NoQuorum, message).retry_after(TRY_AGAIN)
 }

@@ -6,6 +6,7 @@ use uuid::Uuid;
 
 use super::view::View;
 use crate::beat::MapHead;
+use crate::catalog::Placement;
 
 /// Beats for which a node that does not lead what it should is waited for: it may be starting, or another may be better
 /// placed.
@@ -37,8 +38,8 @@ pub(super) struct Known<'a> {
     pub(super) sequence_before: u64,
     /// Who leads, as far as it has read the log.
     pub(super) lead: &'a Lead,
-    /// The node that is to lead whenever it can.
-    pub(super) wished: Option<&'a NodeName>,
+    /// Which nodes hold the map, and which of them is to lead whenever it can.
+    pub(super) placement: &'a Placement,
     /// The others.
     pub(super) view: &'a View,
     /// Its own beats since it has seen no node lead the map.
@@ -50,7 +51,8 @@ pub(super) struct Known<'a> {
 }
 
 /// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart
-/// by the log. It is made so that one claims as a rule, and soon.
+/// by the log. It is made so that one claims as a rule, and soon. A node that is to hold the map no more claims
+/// nothing, and leads until a holder can take over.
 pub(super) fn choose(known: &Known<'_>) -> Choice {
     match known.lead {
         Lead::Shared { is_here: true, .. } => match successor(known) {
@@ -65,6 +67,12 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
             None => Choice::Stay,
         },
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
+        // One that is to hold the map no more takes what it is given: it has what the holders have not.
+        Lead::Shared { leader, .. }
+            if !known.placement.holders.contains(known.own) && leader.as_ref() != Some(known.own) =>
+        {
+            Choice::Stay
+        }
         // What it would write, not all could read: nodes are exchanged one by one.
         Lead::Shared { .. } if known.view.reads_least(known.map) < known.record_version => Choice::Stay,
         Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
@@ -72,18 +80,22 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
     }
 }
 
-/// The node that is to lead in the place of this one: the one that is wished, and where a live node cannot read what this
-/// one writes, any whose records all can read, the furthest first.
+/// The node to which this one, which leads, gives the lead: the holder that is wished, and where this one is to hold the
+/// map no more, or writes what a live node cannot read, any holder whose records all can read, the furthest first.
 fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     let Known { view, map, .. } = *known;
+    let Placement { holders, leader: wished } = known.placement;
     let read_by_all = view.reads_least(map).min(known.record_version);
-    let may_lead = |node: &NodeName| view.writes(node) <= read_by_all && can_take_over(known, node);
-    let wished = known.wished.filter(|wished| may_lead(wished));
-    if wished.is_some() || read_by_all == known.record_version {
-        return wished;
-    }
-    let rank = |(node, head): &(&NodeName, &MapHead)| (head.sequence, std::cmp::Reverse((*node).clone()));
-    view.holders(map).filter(|(node, _)| may_lead(node)).max_by_key(rank).map(|(node, _)| node)
+    let may_lead = |node: &NodeName| {
+        holders.contains(node) && view.writes(node) <= read_by_all && can_take_over(known, node)
+    };
+    let able = view.holders(map).filter(|(node, _)| may_lead(node));
+    let may_go_on = holders.contains(known.own) && read_by_all == known.record_version;
+    let rank = |(node, head): &(&NodeName, &MapHead)| {
+        (wished.as_ref() == Some(*node), head.sequence, std::cmp::Reverse((*node).clone()))
+    };
+    let first = able.max_by_key(rank).map(|(node, _)| node);
+    first.filter(|node| !may_go_on || wished.as_ref() == Some(*node))
 }
 
 /// True where another node leads, or may be about to. One that the log names and that does not take over is not waited
@@ -94,18 +106,20 @@ fn is_led_elsewhere(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
     leads || (known.view.is_live(leader) && known.waited < PATIENCE)
 }
 
-/// True of the node that is furthest; of several, of the one that leads by the log, is wished, or has the first name.
+/// True of the node that is furthest; of several holders, of the one that leads by the log, is wished, or has the first
+/// name. Nodes that have a copy and are to hold the map no more do not claim; what they have counts.
 fn is_first(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
+    let Placement { holders, leader: wished } = known.placement;
     let rank = |node: &NodeName, revision: u64| {
-        (revision, leader == Some(node), known.wished == Some(node), std::cmp::Reverse(node.clone()))
+        (revision, leader == Some(node), wished.as_ref() == Some(node), std::cmp::Reverse(node.clone()))
     };
     let own = rank(known.own, known.revision);
-    let mut others = known.view.holders(known.map);
-    match known.waited < PATIENCE {
-        true => others.all(|(node, head)| rank(node, head.revision) < own),
-        // Whoever would have been first does not come.
-        false => others.all(|(_, head)| head.revision <= known.revision),
-    }
+    // Whoever would have been first does not come where it was waited for long.
+    let comes = |node: &NodeName| known.waited < PATIENCE && holders.contains(node);
+    known.view.holders(known.map).all(|(node, head)| match comes(node) {
+        true => rank(node, head.revision) < own,
+        false => head.revision <= known.revision,
+    })
 }
 
 /// The live node that is furthest, where that is further than this one.
@@ -118,8 +132,12 @@ fn furthest<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
 /// than this node after the claim. What it said before is no measure: the log may have lost its newest messages since. Nor
 /// is it that it said nothing of the map: it may have taken its copy since.
 fn all_have_heard(known: &Known<'_>, claim: Option<Uuid>) -> bool {
-    known.view.others.values().filter(|seen| seen.is_live).all(|seen| {
+    let holders = &known.placement.holders;
+    known.view.others.iter().filter(|(_, seen)| seen.is_live).all(|(node, seen)| {
         let head = seen.beat.maps.get(&known.map);
+        if head.is_none() && !holders.contains(node) {
+            return true;
+        }
         let has_read = |head: &MapHead| head.is_parted || (claim.is_some() && head.claim == claim);
         head.is_some_and(has_read) || known.claimed_at.is_some_and(|claimed| seen.revision > claimed)
     })
@@ -137,6 +155,7 @@ mod tests {
 
     use super::*;
     use crate::beat::Beat;
+    use crate::catalog::Holders;
     use crate::node::view::Seen;
 
     const MAP: Uuid = Uuid::from_u128(1);
@@ -192,15 +211,27 @@ mod tests {
         waited: u64,
         wished: Option<&str>,
     ) -> Choice {
-        let (own, wished, view) = (node("b"), wished.map(node), view(others));
-        let (wished, view) = (wished.as_ref(), &view);
+        chosen_of(Holders::All, lead, others, waited, wished)
+    }
+
+    /// The same, of a map that these nodes hold.
+    fn chosen_of(
+        holders: Holders,
+        lead: &Lead,
+        others: &[(&str, bool, Option<u64>, bool)],
+        waited: u64,
+        wished: Option<&str>,
+    ) -> Choice {
+        let (own, view) = (node("b"), view(others));
+        let placement = Placement { holders, leader: wished.map(node) };
+        let (placement, view) = (&placement, &view);
         let known = Known {
             own: &own,
             map: MAP,
             revision: 5,
             sequence_before: 5,
             lead,
-            wished,
+            placement,
             view,
             waited,
             claimed_at: None,
@@ -244,7 +275,6 @@ mod tests {
     /// What `b` at revision 5 does, which writes records of a newer version than the others, or the same.
     fn chosen_by(record_version: u32, lead: &Lead, view: &View, wished: Option<&str>) -> Choice {
         let (own, wished) = (node("b"), wished.map(node));
-        let wished = wished.as_ref();
         let (map, revision, sequence_before, waited) = (MAP, 5, 5, PATIENCE);
         choose(&Known {
             own: &own,
@@ -252,7 +282,7 @@ mod tests {
             revision,
             sequence_before,
             lead,
-            wished,
+            placement: &Placement { holders: Holders::All, leader: wished },
             view,
             waited,
             claimed_at: None,
@@ -317,7 +347,7 @@ mod tests {
                 revision: 5,
                 sequence_before: 5,
                 lead: &lead,
-                wished: None,
+                placement: &Placement { holders: Holders::All, leader: None },
                 view: &view,
                 waited: 0,
                 claimed_at,
@@ -354,6 +384,37 @@ mod tests {
     #[test]
     fn a_map_that_nobody_led_yet_is_claimed() {
         assert_eq!(chosen(&led_by(None, false), &[], 0, None), Choice::Claim);
+    }
+
+    #[test]
+    fn who_is_no_holder_claims_nothing_and_gives_the_lead_to_a_holder_that_has_followed() {
+        let chosen = |holders: &[&str], lead: &Lead, others: &[(&str, bool, Option<u64>, bool)], wished| {
+            chosen_of(Holders::Only(holders.iter().map(|name| node(name)).collect()), lead, others, 9, wished)
+        };
+        let (led, followed) = (led_by(Some("b"), true), led_by(Some("b"), false));
+        assert_eq!(chosen(&["a", "c"], &followed, &[], None), Choice::Stay);
+        assert_eq!(chosen(&["b", "c"], &followed, &[], None), Choice::Claim);
+        let both = [("a", true, Some(5), false), ("c", true, Some(5), false)];
+        assert_eq!(chosen(&["a", "c"], &led, &both, None), Choice::HandOver(node("a")));
+        assert_eq!(chosen(&["a", "c"], &led, &both, Some("c")), Choice::HandOver(node("c")));
+        assert_eq!(chosen(&["c"], &led, &both, None), Choice::HandOver(node("c")));
+        assert_eq!(chosen(&["c"], &led, &both[..1], None), Choice::Stay, "its holder has no copy yet");
+        assert_eq!(chosen(&["c"], &led, &[("c", true, Some(4), false)], None), Choice::Stay, "it is behind");
+        assert_eq!(
+            chosen(&["b", "c"], &led, &both, Some("a")),
+            Choice::Stay,
+            "the one that is wished holds none"
+        );
+    }
+
+    #[test]
+    fn a_copy_that_is_about_to_go_is_not_waited_for_and_what_it_has_counts() {
+        let of = |leaving: u64| {
+            let holders = Holders::Only([node("b")].into());
+            chosen_of(holders, &led_by(None, false), &[("a", true, Some(leaving), false)], 0, None)
+        };
+        assert_eq!(of(5), Choice::Claim, "the first name does not count");
+        assert_eq!(of(6), Choice::Stay, "it would lose what only that one has");
     }
 
     #[test]

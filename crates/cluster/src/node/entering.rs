@@ -4,22 +4,35 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use mrol_map::map::MapName;
-use mrol_service::{Later, NewMap, Reason, ServiceError, SharedCatalog};
-use tokio::sync::{Mutex, mpsc, oneshot};
+use mrol_service::replication::NodeName;
+use mrol_service::{Later, MapElsewhere, MapHolder, NewMap, Reason, ServiceError, SharedCatalog};
+use tokio::sync::{Mutex, mpsc, oneshot, watch};
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use super::blocking::{blocking, no_quorum};
+use super::blocking::{blocking, no_quorum, try_again};
 use super::keepers::Wish;
-use crate::catalog::{CatalogError, Listing};
+use super::room::holders;
+use super::settings::NodeSettings;
+use super::view::{Seen, View};
+use crate::beats::BEAT_EVERY;
+use crate::catalog::{CatalogError, Holders, Listing, MapEntry};
 use crate::store::{ClusterStore, EnterError};
 
 /// Enters maps into the cluster's list and deletes them.
 #[derive(Debug)]
 pub(super) struct Entering {
+    node: NodeName,
+    /// How many nodes hold a map that is made here; 0 where all do.
+    copies: usize,
+    /// True where this node serves by TLS: it sends nobody, and nobody's key, to an address in the clear.
+    is_secured: bool,
     /// None before NATS has answered.
     joined: Arc<OnceLock<ClusterStore>>,
     wishes: mpsc::UnboundedSender<Wish>,
+    view: watch::Receiver<View>,
+    /// The maps of the cluster, as the keepers have read them.
+    list: watch::Receiver<Listing>,
     /// The list as it was read last for a map that this node has no copy of, and when.
     looked: Mutex<Option<(Instant, Result<Listing, CatalogError>)>>,
 }
@@ -33,10 +46,21 @@ const COPIED_WITHIN: Duration = Duration::from_secs(5);
 /// which it fetches, reads and writes.
 const DONE_WITHIN: Duration = Duration::from_secs(20);
 const LONGER_A_MEGABYTE: Duration = Duration::from_millis(500);
+/// How long a map that some nodes are to hold waits until it is known which of them are live: a node that was just
+/// started sees after four beats who is gone.
+const SETTLED_WITHIN: Duration = BEAT_EVERY.saturating_mul(6);
 
 impl Entering {
-    pub(super) fn new(joined: Arc<OnceLock<ClusterStore>>, wishes: mpsc::UnboundedSender<Wish>) -> Self {
-        Self { joined, wishes, looked: Mutex::default() }
+    pub(super) fn new(
+        settings: &NodeSettings,
+        joined: Arc<OnceLock<ClusterStore>>,
+        wishes: mpsc::UnboundedSender<Wish>,
+        view: watch::Receiver<View>,
+        list: watch::Receiver<Listing>,
+    ) -> Self {
+        let (node, copies) = (settings.name.clone(), settings.copies);
+        let is_secured = settings.http.starts_with("https://");
+        Self { node, copies, is_secured, joined, wishes, view, list, looked: Mutex::default() }
     }
 
     fn joined(&self) -> Result<ClusterStore, ServiceError> {
@@ -64,11 +88,11 @@ impl Entering {
         Err(ServiceError::new(Reason::OutcomeUnknown, message))
     }
 
-    /// The uuid of a map in the list of now; none where it is not listed.
+    /// What is listed of a map now; none where it is not listed.
     ///
     /// # Errors
     /// `NoQuorum` where that is not known.
-    async fn listed(&self, name: &MapName) -> Result<Option<Uuid>, ServiceError> {
+    async fn listed(&self, name: &MapName) -> Result<Option<MapEntry>, ServiceError> {
         let mut looked = self.looked.lock().await;
         let is_new = |(at, _): &(Instant, _)| at.elapsed() < LOOKED_FOR;
         if !looked.as_ref().is_some_and(is_new) {
@@ -78,24 +102,80 @@ impl Entering {
             *looked = Some((Instant::now(), read));
         }
         match looked.as_ref() {
-            Some((_, Ok(listing))) => Ok(listing.map(name).map(|entry| entry.uuid)),
+            Some((_, Ok(listing))) => Ok(listing.map(name).cloned()),
             Some((_, Err(error))) => Err(told(name, error.clone())),
             None => Ok(None),
         }
     }
 
+    /// The nodes that are to hold a map which is made here, once it is known which of them are live.
+    async fn holders_of_new(&self) -> Result<Holders, ServiceError> {
+        if self.copies == 0 {
+            return Ok(Holders::All);
+        }
+        let mut view = self.view.clone();
+        let settled = timeout(SETTLED_WITHIN, view.wait_for(|view| view.is_settled)).await;
+        match settled {
+            Ok(Ok(view)) => Ok(holders(self.copies, &self.node, &view)),
+            _ => Err(try_again("this node has not seen yet which of the others are live")),
+        }
+    }
+
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
         let (joined, of, uuid) = (self.joined()?, name.clone(), new.uuid);
+        let holders = self.holders_of_new().await?;
         let within = DONE_WITHIN + LONGER_A_MEGABYTE * (new.file.len() >> 20) as u32;
-        let entered = blocking(move || -> Result<Uuid, ServiceError> {
-            joined.enter(&of, &new).map_err(|error| match error {
+        let entered = blocking(move || -> Result<(Uuid, Option<MapEntry>), ServiceError> {
+            let there = joined.enter(&of, &new, &holders).map_err(|error| match error {
                 EnterError::NotPut(why) => no_quorum(&why),
                 EnterError::Catalog(error) => told(&of, error),
-            })
+            })?;
+            // Another node has made it, and not for this one.
+            let (listing, _) = match there == uuid {
+                true => return Ok((there, None)),
+                false => joined.catalog.read().map_err(|error| told(&of, error))?,
+            };
+            Ok((there, listing.map(&of).cloned()))
         });
-        let there = entered.await?;
+        let (there, entry) = entered.await?;
+        if let Some(entry) = entry {
+            self.check_held_here(name, &entry)?;
+        }
         self.wait(name, there, true, within).await?;
         Ok(there == uuid)
+    }
+
+    /// The live nodes that hold a map, of others: those that have a copy first, and of these the one that leads.
+    fn live_holders(&self, entry: &MapEntry) -> Vec<MapHolder> {
+        let (view, holders) = (self.view.borrow(), entry.holders());
+        let others = view.others.iter().filter(|(node, seen)| seen.is_live && holders.contains(node));
+        let mut live: Vec<(&NodeName, &Seen)> = others.collect();
+        live.sort_by_key(|(_, Seen { beat, .. })| {
+            let head = beat.maps.get(&entry.uuid).filter(|head| !head.is_parted);
+            (head.is_none(), head.is_none_or(|head| !head.leads))
+        });
+        let holder = |(node, Seen { beat, .. }): (&NodeName, &Seen)| MapHolder {
+            node: node.to_string(),
+            http: beat.http.clone(),
+            grpc: beat.grpc.clone(),
+        };
+        let is_allowed = |holder: &MapHolder| {
+            !self.is_secured || [&holder.http, &holder.grpc].iter().all(|at| at.starts_with("https://"))
+        };
+        live.into_iter().map(holder).filter(is_allowed).collect()
+    }
+
+    /// Refuses a map that other nodes hold, with the addresses of those that are live.
+    fn check_held_here(&self, name: &MapName, entry: &MapEntry) -> Result<(), ServiceError> {
+        let holders = entry.holders();
+        if holders.contains(&self.node) {
+            return Ok(());
+        }
+        let live = self.live_holders(entry);
+        if live.is_empty() {
+            return Err(try_again(&format!("none of the nodes that hold map {name} ({holders}) is live")));
+        }
+        Err(ServiceError::map_elsewhere(name, live))
     }
 
     async fn delete_map(&self, name: &MapName, uuid: Uuid) -> Result<(), ServiceError> {
@@ -123,10 +203,17 @@ impl SharedCatalog for Entering {
 
     fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(async move {
-            let Some(uuid) = self.listed(name).await? else { return Ok(false) };
-            let waited = timeout(COPIED_WITHIN, self.wait(name, uuid, true, COPIED_WITHIN)).await;
+            let Some(entry) = self.listed(name).await? else { return Ok(false) };
+            self.check_held_here(name, &entry)?;
+            let waited = timeout(COPIED_WITHIN, self.wait(name, entry.uuid, true, COPIED_WITHIN)).await;
             Ok(waited.is_ok_and(|waited| waited.is_ok()))
         })
+    }
+
+    fn held_elsewhere(&self) -> Vec<MapElsewhere> {
+        let list = self.list.borrow();
+        let others = list.maps().filter(|(_, entry)| !entry.holders().contains(&self.node));
+        others.map(|(name, entry)| MapElsewhere { name, holders: self.live_holders(entry) }).collect()
     }
 
     fn delete<'a>(&'a self, name: &'a MapName, uuid: Uuid) -> Later<'a, Result<(), ServiceError>> {

@@ -1,6 +1,6 @@
 //! A node's beats, and what it sees of those of the others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -18,6 +18,7 @@ use super::settings::NodeSettings;
 use super::view::{Seen, View};
 use crate::beat::{Beat, MapHead};
 use crate::beats::{BEAT_EVERY, NodeBeat};
+use crate::catalog::Listing;
 use crate::forwarder::Forwarder;
 use crate::liveness::Liveness;
 use crate::store::ClusterStore;
@@ -44,6 +45,8 @@ pub(super) struct Heart {
     /// Is told the addresses of the others.
     pub(super) forwarder: Arc<Forwarder>,
     pub(super) view: watch::Sender<View>,
+    /// The maps of the cluster, as far as this node has read.
+    pub(super) list: watch::Receiver<Listing>,
     /// Whether it is where the others are.
     pub(super) lag: Arc<Mutex<Lag>>,
 }
@@ -135,7 +138,8 @@ impl Heart {
             (node, Seen { beat, revision, is_live })
         };
         let others = others.into_iter().map(seen).collect();
-        let now = View { beats, all_beats, revision, seen: Some(Instant::now()), others };
+        let (seen, is_settled) = (Some(Instant::now()), liveness.is_settled());
+        let now = View { beats, all_beats, revision, seen, is_settled, others };
         tell_changes(&self.view.borrow(), &now);
         let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
         // The secret of the cluster is sent there: in the clear only where this node serves in the clear as well.
@@ -153,7 +157,9 @@ impl Heart {
         if now.seen.is_none() {
             return;
         }
-        let is_behind = is_behind(own, if before.seen.is_some() { before } else { &now });
+        let elsewhere = self.list.borrow().not_held_by(&self.settings.name);
+        let then = if before.seen.is_some() { before } else { &*now };
+        let is_behind = is_behind(own, then, &elsewhere);
         let mut lag = self.lag.lock();
         *lag = lag.then(is_behind, Instant::now());
     }
@@ -173,11 +179,13 @@ fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
     Some((map.version.map_uuid, MapHead { revision, epoch, claim, sequence, leads: is_here, is_parted }))
 }
 
-/// True where a copy is behind where another node was then, or is not there.
-fn is_behind(own: &Beat, then: &View) -> bool {
+/// True where a copy is behind where another node was then, or is not there, of a map that is not held `elsewhere`.
+fn is_behind(own: &Beat, then: &View, elsewhere: &BTreeSet<Uuid>) -> bool {
     let is_reached =
         |map: &Uuid, revision: u64| own.maps.get(map).is_some_and(|own| own.revision >= revision);
-    then.furthest().iter().any(|(map, revision)| !is_reached(map, *revision))
+    let furthest = then.furthest();
+    let mut held = furthest.iter().filter(|(map, _)| !elsewhere.contains(map));
+    held.any(|(map, revision)| !is_reached(map, *revision))
 }
 
 /// Tells the log which nodes have come and gone.

@@ -14,34 +14,21 @@ use uuid::Uuid;
 
 use super::blocking::{blocking, no_quorum};
 use super::choice::{Choice, Known, choose};
+use super::claimed::{Claimed, LOOKED_EVERY};
 use super::cutting::Cutting;
 use super::heart::Pulse;
+use super::release::{Progress, Release};
 use super::settings::BaseLimits;
 use super::view::View;
+use crate::catalog::Placement;
 use crate::following::Following;
 use crate::jetstream_log::JetStreamLog;
 use crate::store::ClusterStore;
 
 /// Pause before a copy is tried again.
 const PAUSE: Duration = Duration::from_secs(1);
-/// How often a node that has claimed looks at the beats of the others, and how many times: they beat as soon as they have
-/// read its claim.
-const LOOKED_EVERY: Duration = Duration::from_millis(100);
-const LOOKS_MAX: u32 = 20;
-
-/// A claim of this node.
-#[derive(Debug, Clone, Copy, Default)]
-struct Claimed {
-    id: Option<Uuid>,
-    /// Its beats before, those in between counted.
-    beats_before: u64,
-    /// A revision of the beats' bucket after it.
-    at: Option<u64>,
-    /// Looks at the beats since.
-    looks: u32,
-}
-
 /// Keeps this node's copy of one map: takes it in where it has none, shares it by its log, and leads it where it is to.
+/// Where the node is to hold the map no more, drops the copy once others have what it has.
 pub(super) struct Keeper {
     pub(super) node: NodeName,
     /// Version of the records that it writes.
@@ -52,8 +39,8 @@ pub(super) struct Keeper {
     pub(super) joined: ClusterStore,
     pub(super) name: MapName,
     pub(super) uuid: Uuid,
-    /// The node that is to lead the map whenever it can.
-    pub(super) wished: watch::Receiver<Option<NodeName>>,
+    /// Which nodes hold the map, and which of them is to lead it whenever it can.
+    pub(super) placement: watch::Receiver<Placement>,
     pub(super) view: watch::Receiver<View>,
     pub(super) pulse: std_mpsc::Sender<Pulse>,
     /// How often this node took a map over.
@@ -61,10 +48,10 @@ pub(super) struct Keeper {
 }
 
 impl Keeper {
-    /// Keeps it until it is aborted, or there is no copy any more.
+    /// Keeps it until it is aborted, or the node has no copy any more.
     pub(super) async fn keep(mut self) {
         loop {
-            let log = self.shared().await;
+            let Some(log) = self.shared().await else { return };
             let _following = Following::begin(self.service.clone(), self.name.clone(), &log);
             let Ok(lead) = self.service.lead_of(&self.name).await else { return };
             match self.lead_where_due(lead, log).await {
@@ -74,8 +61,9 @@ impl Keeper {
         }
     }
 
-    /// Takes a copy in where there is none, and shares it by its log, again and again until that is done.
-    async fn shared(&self) -> Arc<JetStreamLog> {
+    /// Takes a copy in where there is none, and shares it by its log, again and again until that is done; none where this
+    /// node has none and is to hold none.
+    async fn shared(&self) -> Option<Arc<JetStreamLog>> {
         let mut last_said = None;
         loop {
             let error = match self.share().await {
@@ -90,10 +78,16 @@ impl Keeper {
         }
     }
 
-    /// Takes a copy in where there is none, and shares it by its log.
-    async fn share(&self) -> Result<Arc<JetStreamLog>, ServiceError> {
+    fn is_holder(&self) -> bool {
+        self.placement.borrow().holders.contains(&self.node)
+    }
+
+    /// Takes a copy in where there is none, and shares it by its log; none where there is none and this node is to hold
+    /// none.
+    async fn share(&self) -> Result<Option<Arc<JetStreamLog>>, ServiceError> {
         match self.service.uuid_of_copy(&self.name).await? {
             Some(uuid) if uuid == self.uuid => {}
+            _ if !self.is_holder() => return Ok(None),
             Some(other) => {
                 tracing::error!(
                     map = %self.name, %other, listed = %self.uuid,
@@ -109,12 +103,12 @@ impl Keeper {
         let shared = self.service.share_map(&self.name, log.clone(), self.node.clone()).await;
         match shared {
             // It follows once the log answers, or tells that it has parted from it.
-            Err(error) if error.reason == Reason::NoQuorum => Ok(log),
+            Err(error) if error.reason == Reason::NoQuorum => Ok(Some(log)),
             Err(error) if error.reason == Reason::HistoriesDiffer => {
                 self.load_if_behind(&log).await?;
-                Ok(log)
+                Ok(Some(log))
             }
-            shared => shared.map(|_| log),
+            shared => shared.map(|_| Some(log)),
         }
     }
 
@@ -148,7 +142,9 @@ impl Keeper {
     /// or the log begins behind what it has.
     async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) -> Ended {
         let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid, self.bases);
-        let (mut waited_since, mut sequences, mut beats_then) = (None, [0; 2], 0);
+        let (mut waited_since, mut release, mut beats_then) = (None, None, 0);
+        // Two beats ago, and one.
+        let mut progress = [None::<Progress>; 2];
         let (mut claimed, mut claim_told) = (Claimed::default(), None);
         loop {
             let view = self.view.borrow_and_update().clone();
@@ -177,14 +173,14 @@ impl Keeper {
                     _ = self.pulse.send(Pulse::Beat);
                 }
             }
-            let wished = self.wished.borrow_and_update().clone();
+            let placement = self.placement.borrow_and_update().clone();
             let known = Known {
                 own: &self.node,
                 map: self.uuid,
                 revision: version.revision,
-                sequence_before: sequences[0],
+                sequence_before: progress[0].map_or(0, |before| before.sequence),
                 lead: &now,
-                wished: wished.as_ref(),
+                placement: &placement,
                 view: &view,
                 waited: view.beats - since,
                 claimed_at: claimed.at,
@@ -197,15 +193,24 @@ impl Keeper {
                 let needed = heads.min().unwrap_or(*sequence);
                 cutting.look(&self.service, &self.name, needed.min(*sequence)).await;
             }
+            if placement.holders.contains(&self.node) {
+                release = None;
+            } else {
+                let release = release.get_or_insert_with(Release::default);
+                let is_due = release.is_due(self.uuid, &placement.holders, &view, progress[0]);
+                if is_due && self.is_copy_of_others(&now) && self.drop_copy(&placement).await {
+                    return Ended::Gone;
+                }
+            }
             tokio::select! {
                 changed = self.view.changed() => {
                     if changed.is_err() {
                         return Ended::Gone;
                     }
                     let beats = self.view.borrow().beats;
-                    let Lead::Shared { sequence, .. } = &*lead.borrow() else { continue };
                     if std::mem::replace(&mut beats_then, beats) != beats {
-                        sequences = [sequences[1], *sequence];
+                        let there = progress_of(&lead.borrow(), version.revision);
+                        progress = [progress[1].filter(|_| there.is_some()), there];
                     }
                 }
                 () = tokio::time::sleep(LOOKED_EVERY), if claimed.waits(&now) => {
@@ -213,9 +218,37 @@ impl Keeper {
                     _ = self.pulse.send(Pulse::Beat);
                 }
                 () = leader_changed(&mut lead, &now) => {}
-                _ = self.wished.changed() => {}
+                _ = self.placement.changed() => {}
             }
         }
+    }
+
+    /// True where this node follows, and has nothing that the log has not.
+    fn is_copy_of_others(&self, lead: &Lead) -> bool {
+        let follows = matches!(lead, Lead::Shared { leader: Some(_), is_here: false, .. });
+        let shared = self.service.shared_maps();
+        let own = shared.iter().find(|map| map.name == self.name);
+        follows && own.is_some_and(|map| map.failure.is_none())
+    }
+
+    /// Drops this node's copy, unless the list names other holders by now; true once it is gone.
+    async fn drop_copy(&self, placement: &Placement) -> bool {
+        let catalog = self.joined.catalog.clone();
+        let Ok((listing, _)) = blocking(move || catalog.read()).await else { return false };
+        let entry = listing.map(&self.name).filter(|entry| entry.uuid == self.uuid);
+        if entry.is_none_or(|entry| entry.holders() != placement.holders) {
+            return false;
+        }
+        match self.service.leave_to_others(&self.name, self.uuid).await {
+            Ok(()) => {
+                tracing::info!(map = %self.name, "other nodes hold the map: this one has dropped its copy")
+            }
+            Err(error) => {
+                tracing::warn!(map = %self.name, why = error.message, "the copy stays, which others hold by now");
+                return false;
+            }
+        }
+        true
     }
 
     async fn act(&self, choice: Choice, view: &View, lead: &Lead) {
@@ -247,25 +280,6 @@ impl Keeper {
     }
 }
 
-impl Claimed {
-    /// Notes what this node sees that has claimed.
-    fn note(&mut self, id: Option<Uuid>, view: &View) {
-        if self.id != id {
-            *self = Self { id, beats_before: view.all_beats, ..Self::default() };
-        }
-        // The first that is acknowledged may have begun before the claim. Where an older copy of the bucket was put back,
-        // its revisions are smaller from then on.
-        if view.all_beats >= self.beats_before + 2 {
-            self.at = Some(self.at.map_or(view.revision, |at| at.min(view.revision)));
-        }
-    }
-
-    /// True while the others' beats are looked at more often.
-    fn waits(&self, lead: &Lead) -> bool {
-        matches!(lead, Lead::Shared { is_here: false, has_claimed: true, .. }) && self.looks < LOOKS_MAX
-    }
-}
-
 /// Why a node ends looking whether it is to lead.
 enum Ended {
     /// The copy is gone, or the node ends.
@@ -275,6 +289,15 @@ enum Ended {
 }
 
 /// Waits until there was a claim, or this node has taken over or lost the lead.
+/// How far a copy is, at `revision`; none before it has joined its log, where that says nothing.
+fn progress_of(lead: &Lead, revision: u64) -> Option<Progress> {
+    match lead {
+        Lead::Shared { sequence, .. } => Some(Progress { sequence: *sequence, revision }),
+        _ => None,
+    }
+}
+
+/// Waits until the log names another node, or this one has taken over or lost the lead.
 async fn leader_changed(lead: &mut watch::Receiver<Lead>, before: &Lead) {
     let of = |lead: &Lead| match lead {
         Lead::Shared { leader, is_here, claim, .. } => Some((leader.clone(), *is_here, *claim)),

@@ -1,4 +1,4 @@
-//! One keeper for each map of the cluster's list.
+//! One keeper for each map of the cluster's list that this node holds.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use super::heart::Pulse;
 use super::keeper::Keeper;
 use super::settings::{BaseLimits, NodeSettings};
 use super::view::View;
-use crate::catalog::Listing;
+use crate::catalog::{Listing, Placement};
 use crate::store::ClusterStore;
 
 /// How often it is looked for it.
@@ -41,7 +41,7 @@ pub(super) struct Wish {
     pub(super) told: oneshot::Sender<()>,
 }
 
-/// One keeper for each map of the cluster's list.
+/// One keeper for each map of the cluster's list that this node holds, or has a copy of still.
 pub(super) struct Keepers {
     node: NodeName,
     record_version: u32,
@@ -50,6 +50,8 @@ pub(super) struct Keepers {
     joined: ClusterStore,
     view: watch::Receiver<View>,
     pulse: std_mpsc::Sender<Pulse>,
+    /// Is told the list.
+    list: watch::Sender<Listing>,
     /// How often this node took a map over.
     takeovers: Arc<AtomicU64>,
     kept: BTreeMap<MapName, Kept>,
@@ -61,7 +63,7 @@ pub(super) struct Keepers {
 
 struct Kept {
     uuid: Uuid,
-    wished: watch::Sender<Option<NodeName>>,
+    placement: watch::Sender<Placement>,
     task: JoinHandle<()>,
 }
 
@@ -78,10 +80,12 @@ impl Keepers {
         joined: ClusterStore,
         view: watch::Receiver<View>,
         pulse: std_mpsc::Sender<Pulse>,
+        list: watch::Sender<Listing>,
         takeovers: Arc<AtomicU64>,
     ) -> Self {
         let NodeSettings { name: node, record_version, bases, .. } = settings.clone();
         let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
+        let revision = 0;
         Self {
             node,
             record_version,
@@ -90,9 +94,10 @@ impl Keepers {
             joined,
             view,
             pulse,
+            list,
             takeovers,
             kept,
-            revision: 0,
+            revision,
             deleted,
         }
     }
@@ -134,6 +139,9 @@ impl Keepers {
                 let is_new = std::mem::replace(&mut self.revision, revision) != revision;
                 // A copy that could not be dropped then is dropped now.
                 self.follow(&listing).await;
+                if is_new {
+                    self.list.send_replace(listing);
+                }
                 is_new
             }
             Err(error) => {
@@ -148,8 +156,10 @@ impl Keepers {
         for uuid in listing.deleted() {
             self.deleted.entry(uuid).or_insert(now);
         }
-        let is_other =
-            |name: &MapName, kept: &Kept| listing.map(name).is_none_or(|entry| entry.uuid != kept.uuid);
+        // One ends by itself where the node has no copy any more.
+        let is_other = |name: &MapName, kept: &Kept| {
+            kept.task.is_finished() || listing.map(name).is_none_or(|entry| entry.uuid != kept.uuid)
+        };
         let ended: Vec<_> = self
             .kept
             .iter()
@@ -159,27 +169,35 @@ impl Keepers {
         for name in ended {
             drop(self.kept.remove(&name));
         }
+        let mut copies = BTreeSet::new();
         for map in self.service.shared_maps() {
             if listing.is_deleted(map.version.map_uuid) {
                 self.drop_copy(&map.name, map.version.map_uuid).await;
+            } else {
+                copies.insert((map.name, map.version.map_uuid));
             }
         }
         for (name, entry) in listing.maps() {
-            let wished = entry.leader();
+            let placement = entry.placement();
             match self.kept.get(&name) {
                 Some(kept) => {
-                    kept.wished.send_if_modified(|there| std::mem::replace(there, wished.clone()) != wished);
+                    let is_other =
+                        |there: &mut Placement| std::mem::replace(there, placement.clone()) != placement;
+                    kept.placement.send_if_modified(is_other);
                 }
-                None => {
-                    let kept = self.begin(&name, entry.uuid, wished);
+                None if placement.holders.contains(&self.node)
+                    || copies.contains(&(name.clone(), entry.uuid)) =>
+                {
+                    let kept = self.begin(&name, entry.uuid, placement);
                     self.kept.insert(name, kept);
                 }
+                None => {}
             }
         }
     }
 
-    fn begin(&self, name: &MapName, uuid: Uuid, wished: Option<NodeName>) -> Kept {
-        let (wished, heard) = watch::channel(wished);
+    fn begin(&self, name: &MapName, uuid: Uuid, placement: Placement) -> Kept {
+        let (placement, heard) = watch::channel(placement);
         let keeper = Keeper {
             node: self.node.clone(),
             record_version: self.record_version,
@@ -188,12 +206,12 @@ impl Keepers {
             joined: self.joined.clone(),
             name: name.clone(),
             uuid,
-            wished: heard,
+            placement: heard,
             view: self.view.clone(),
             pulse: self.pulse.clone(),
             takeovers: Arc::clone(&self.takeovers),
         };
-        Kept { uuid, wished, task: tokio::spawn(keeper.keep()) }
+        Kept { uuid, placement, task: tokio::spawn(keeper.keep()) }
     }
 
     async fn drop_copy(&self, name: &MapName, uuid: Uuid) {

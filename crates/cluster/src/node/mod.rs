@@ -3,24 +3,28 @@
 //! Reading order; none names a file of a later line:
 //!
 //! 1. `settings`, `view`: what a node is made of, and what it sees of the others.
-//! 2. `choice`: who is to lead a map, by what is seen.
+//! 2. `room`, `choice`, `release`: who is to hold a new map, who is to lead one, and when a copy is dropped that others
+//!    hold, by what is seen.
 //! 3. `blocking`: questions to NATS, which block.
 //! 4. `lag`: whether it is where the others are.
 //! 5. `heart`: beats every two seconds, and sees who is gone.
 //! 6. `cutting`: puts a base and cuts the front of a log off.
-//! 7. `keeper`: keeps this node's copy of one map, and leads it where it is to.
-//! 8. `keepers`: one for each map of the cluster's list.
+//! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads it where it is to.
+//! 8. `keepers`: one for each map of the cluster's list that this node holds.
 //! 9. `entering`: enters maps into the list and deletes them, for the operations of the service.
 //! 10. `server`: [`Node`], which puts these together.
 
 mod blocking;
 mod choice;
+mod claimed;
 mod cutting;
 mod entering;
 mod heart;
 mod keeper;
 mod keepers;
 mod lag;
+mod release;
+mod room;
 mod server;
 mod settings;
 mod view;

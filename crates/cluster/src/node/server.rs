@@ -24,6 +24,7 @@ use super::lag::Lag;
 use super::settings::NodeSettings;
 use super::view::View;
 use crate::beat::MapHead;
+use crate::catalog::Listing;
 use crate::engine::ConnectError;
 use crate::forwarder::Forwarder;
 use crate::store::{ClusterStore, NoStore};
@@ -40,6 +41,8 @@ pub struct Node {
     forwarder: Arc<Forwarder>,
     joined: Arc<OnceLock<ClusterStore>>,
     view: watch::Sender<View>,
+    /// The maps of the cluster, as far as it has read.
+    list: watch::Sender<Listing>,
     /// Whether it is where the others are.
     lag: Arc<Mutex<Lag>>,
     takeovers: Arc<AtomicU64>,
@@ -80,6 +83,7 @@ impl Node {
             forwarder: Arc::new(forwarder),
             joined: Arc::default(),
             view: watch::Sender::new(View::default()),
+            list: watch::Sender::new(Listing::default()),
             lag: Arc::default(),
             takeovers: Arc::default(),
             wishes,
@@ -94,7 +98,13 @@ impl Node {
         Cluster {
             node: self.settings.name.clone(),
             forward: Arc::clone(&self.forwarder) as Arc<dyn Forward>,
-            catalog: Arc::new(Entering::new(Arc::clone(&self.joined), self.wishes.clone())),
+            catalog: Arc::new(Entering::new(
+                &self.settings,
+                Arc::clone(&self.joined),
+                self.wishes.clone(),
+                self.view.subscribe(),
+                self.list.subscribe(),
+            )),
         }
     }
 
@@ -115,6 +125,7 @@ impl Node {
             service: service.clone(),
             forwarder: Arc::clone(&self.forwarder),
             view: self.view.clone(),
+            list: self.list.subscribe(),
             lag: Arc::clone(&self.lag),
         };
         match std::thread::Builder::new().name("beats".to_owned()).spawn(move || heart.beat(&pulses)) {
@@ -124,7 +135,8 @@ impl Node {
             }
         }
         let (view, takeovers) = (self.view.subscribe(), Arc::clone(&self.takeovers));
-        let keepers = Keepers::new(&self.settings, service, joined, view, pulse, takeovers);
+        let keepers =
+            Keepers::new(&self.settings, service, joined, view, pulse, self.list.clone(), takeovers);
         keepers.keep(heard).await;
     }
 
@@ -189,7 +201,9 @@ impl Node {
         let mut handed = Vec::new();
         for map in led(service) {
             let view = self.view.borrow().clone();
-            let holders = view.holders(map.version.map_uuid);
+            // One that is about to drop its copy does not lead.
+            let wanted = self.list.borrow().holders_of(map.version.map_uuid);
+            let holders = view.holders(map.version.map_uuid).filter(|(node, _)| wanted.contains(node));
             // Those of an older version read less than a newer one would write.
             let version = |node: &NodeName| view.others[node].beat.record_version;
             let first =

@@ -19,6 +19,8 @@ pub struct NodeSettings {
     pub version: String,
     /// Version of the records that it writes and reads.
     pub record_version: u32,
+    /// How many nodes hold a map that is made at this one; 0 where all do.
+    pub copies: usize,
     /// How it reaches NATS.
     pub engine: EngineSettings,
     /// When it puts a new base for a map that it leads.

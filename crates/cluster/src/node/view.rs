@@ -19,6 +19,8 @@ pub(super) struct View {
     pub(super) revision: u64,
     /// When the last of them was.
     pub(super) seen: Option<Instant>,
+    /// True once it is known of each of the others whether it is gone.
+    pub(super) is_settled: bool,
     /// The other nodes, those that are gone among them.
     pub(super) others: BTreeMap<NodeName, Seen>,
 }

@@ -5,7 +5,7 @@ use mrol_service::replication::NodeName;
 use uuid::Uuid;
 
 use crate::beat::{Beat, MapHead};
-use crate::catalog::{Listing, MapEntry};
+use crate::catalog::{Holders, Listing, MapEntry};
 
 /// Nodes and maps of a cluster, as they are seen at one moment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +36,9 @@ pub struct SeenMap {
     pub uuid: Uuid,
     /// The node that is to lead it whenever it can; none where any will do.
     pub wished: Option<NodeName>,
-    /// The copies, by node.
+    /// The nodes that are to hold it.
+    pub holders: Holders,
+    /// The copies, by node: also those of nodes that are to hold it no more, until others have what they have.
     pub copies: Vec<MapCopy>,
 }
 
@@ -61,7 +63,7 @@ impl Overview {
                 Some(MapCopy { node: seen.node.clone(), is_live: seen.is_live, head })
             };
             let copies = nodes.iter().filter_map(copy).collect();
-            SeenMap { name, uuid: entry.uuid, wished: entry.leader(), copies }
+            SeenMap { name, uuid: entry.uuid, wished: entry.leader(), holders: entry.holders(), copies }
         };
         Self { maps: listing.maps().map(seen).collect(), nodes }
     }
@@ -112,7 +114,8 @@ mod tests {
     }
 
     fn map(copies: Vec<MapCopy>) -> SeenMap {
-        SeenMap { name: MapName::new("hall").unwrap(), uuid: Uuid::nil(), wished: None, copies }
+        let (name, uuid) = (MapName::new("hall").unwrap(), Uuid::nil());
+        SeenMap { name, uuid, wished: None, holders: Holders::All, copies }
     }
 
     fn leader(copies: Vec<MapCopy>) -> Option<String> {

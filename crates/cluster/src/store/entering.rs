@@ -5,7 +5,7 @@ use mrol_service::NewMap;
 use uuid::Uuid;
 
 use super::opening::ClusterStore;
-use crate::catalog::CatalogError;
+use crate::catalog::{CatalogError, Holders};
 use crate::jetstream_log::JetStreamLog;
 
 /// Why a map was not entered into a cluster.
@@ -20,19 +20,19 @@ pub enum EnterError {
 }
 
 impl ClusterStore {
-    /// Enters a map: puts its base, makes its log, and then lists it, so that what the list names is there. Says which
-    /// map has the name: this one, or another that had it before. A map that is listed already stays as it is; what an
-    /// attempt before this one left is put again. Not for an async thread.
+    /// Enters a map that these nodes are to hold: puts its base, makes its log, and then lists it, so that what the
+    /// list names is there. Says which map has the name: this one, or another that had it before. A map that is listed
+    /// already stays as it is; what an attempt before this one left is put again. Not for an async thread.
     ///
     /// # Errors
     /// Says whether the map may be listed.
-    pub fn enter(&self, name: &MapName, new: &NewMap) -> Result<Uuid, EnterError> {
+    pub fn enter(&self, name: &MapName, new: &NewMap, holders: &Holders) -> Result<Uuid, EnterError> {
         let (listing, _) = self.catalog.read()?;
         if let Some(there) = listing.check_place(name, new.uuid)? {
             return Ok(there);
         }
         self.put(new)?;
-        let entered = self.catalog.enter(name, new.uuid);
+        let entered = self.catalog.enter(name, new.uuid, holders);
         let may_be_there = match &entered {
             Ok(there) => *there == new.uuid,
             Err(error) => matches!(error, CatalogError::Unknown(_) | CatalogError::OtherName(_)),

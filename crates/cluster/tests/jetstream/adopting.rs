@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mrol_cluster::{CatalogError, ClusterStore, EnterError, NoStore, OverviewReader, StreamError};
+use mrol_cluster::{CatalogError, ClusterStore, EnterError, Holders, NoStore, OverviewReader, StreamError};
 use mrol_map::map::MapSettings;
 use mrol_service::replication::NodeName;
 use mrol_service::{MapService, NewMap, ServiceSettings};
@@ -39,12 +39,12 @@ fn a_map_that_is_adopted_keeps_its_uuid_and_its_revisions() {
     // An attempt that was cut short leaves what it has put.
     store.bases.put(new.uuid, &new.base, &new.file).unwrap();
     store.pointers.change(new.uuid, &new.base, 0).unwrap();
-    assert_eq!(store.enter(&name("hall"), &new), Ok(new.uuid));
-    assert_eq!(store.enter(&name("hall"), &new), Ok(new.uuid), "it is there");
-    let taken = store.enter(&name("yard"), &new).unwrap_err();
+    assert_eq!(store.enter(&name("hall"), &new, &Holders::All), Ok(new.uuid));
+    assert_eq!(store.enter(&name("hall"), &new, &Holders::All), Ok(new.uuid), "it is there");
+    let taken = store.enter(&name("yard"), &new, &Holders::All).unwrap_err();
     assert_eq!(taken, EnterError::Catalog(CatalogError::OtherName(name("hall"))));
     let other = NewMap { uuid: uuid::Uuid::new_v4(), ..new.clone() };
-    assert_eq!(store.enter(&name("hall"), &other), Ok(new.uuid), "another has the name");
+    assert_eq!(store.enter(&name("hall"), &other, &Holders::All), Ok(new.uuid), "another has the name");
     assert_eq!(store.pointers.read(other.uuid).unwrap(), None, "and nothing was put");
 
     // A node of an empty folder begins with the base, and that of the folder itself with what it has.
@@ -57,7 +57,7 @@ fn a_map_that_is_adopted_keeps_its_uuid_and_its_revisions() {
 
     // Once it was deleted, it does not come back.
     a.runtime.block_on(a.service.delete_map(&name("hall"))).unwrap();
-    let deleted = store.enter(&name("hall"), &new).unwrap_err();
+    let deleted = store.enter(&name("hall"), &new, &Holders::All).unwrap_err();
     assert_eq!(deleted, EnterError::Catalog(CatalogError::Deleted(new.uuid)));
 }
 
@@ -70,7 +70,7 @@ fn what_was_removed_after_it_was_put_can_be_entered_again() {
     store.bases.put(new.uuid, &new.base, &new.file).unwrap();
     let revision = store.pointers.change(new.uuid, &new.base, 0).unwrap();
     store.pointers.forget(new.uuid, revision).unwrap();
-    assert_eq!(store.enter(&name("hall"), &new), Ok(new.uuid));
+    assert_eq!(store.enter(&name("hall"), &new, &Holders::All), Ok(new.uuid));
     assert_eq!(store.pointers.read(new.uuid).unwrap().map(|(base, _)| base), Some(new.base));
     let streams = store.stream_copies([new.uuid]);
     assert_eq!(streams.len(), 5);

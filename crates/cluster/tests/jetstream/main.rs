@@ -5,6 +5,7 @@ mod adopting;
 mod bases;
 mod beats;
 mod connecting;
+mod copies;
 mod cutting;
 #[expect(dead_code, reason = "the tests of a whole site use more of it")]
 #[path = "../../../../tests/cluster/link.rs"]

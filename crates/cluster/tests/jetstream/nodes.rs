@@ -18,7 +18,7 @@ use tokio::runtime::Runtime;
 use crate::support::NatsServers;
 
 /// How long anything may take here: of several machines' worth of servers on one that may be busy.
-const WITHIN: Duration = Duration::from_secs(40);
+pub(crate) const WITHIN: Duration = Duration::from_secs(40);
 
 /// A server with its node; its port is one at which nothing listens once it is gone.
 pub(crate) struct Server {
@@ -33,12 +33,20 @@ pub(crate) fn name(text: &str) -> MapName {
 }
 
 fn forwarder(node: &str) -> Forwarder {
-    Forwarder::new(ForwarderSettings::new(NodeName::new(node).unwrap())).unwrap()
+    // Nobody answers at the ports of these nodes.
+    let call_timeout = Duration::from_secs(2);
+    let settings = ForwarderSettings::new(NodeName::new(node).unwrap());
+    Forwarder::new(ForwarderSettings { call_timeout, ..settings }).unwrap()
 }
 
 impl Server {
     pub(crate) fn start(servers: &NatsServers, node: &str, folder: &Path) -> Self {
         Self::start_with(servers, node, folder, |_| {})
+    }
+
+    /// A node at which maps are made that so many nodes hold; all, where that is 0.
+    pub(crate) fn start_with_copies(servers: &NatsServers, node: &str, folder: &Path, copies: usize) -> Self {
+        Self::start_with(servers, node, folder, |settings| settings.copies = copies)
     }
 
     /// One of which a test says more.
@@ -56,6 +64,7 @@ impl Server {
             grpc: address,
             version: "0".to_owned(),
             record_version: 1,
+            copies: 0,
             engine: servers.settings(),
             bases: BaseLimits::default(),
         };
@@ -279,6 +288,7 @@ fn a_server_by_itself_or_another_node_does_not_open_the_folder_of_a_node() {
                 version: String::new(),
                 record_version: 1,
                 bases: BaseLimits::default(),
+                copies: 0,
                 engine: mrol_cluster::EngineSettings {
                     urls: Vec::new(),
                     credentials: mrol_cluster::Credentials::None,

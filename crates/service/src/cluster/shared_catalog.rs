@@ -8,6 +8,7 @@ use uuid::Uuid;
 use super::later::Later;
 use crate::error::ServiceError;
 use crate::replication::Base;
+use crate::request::MapElsewhere;
 use mrol_map::map::MapName;
 
 /// A map that is to be shared.
@@ -24,18 +25,24 @@ pub struct NewMap {
 /// The list of maps that all nodes of a cluster share. A call that succeeds returns once this node has its own copy of
 /// the map, or none any more; the others follow within a beat.
 pub trait SharedCatalog: Debug + Send + Sync {
-    /// Enters a map; false where there is one of that name already.
+    /// Enters a map; false where there is one of that name already. This node holds it, and so do as many others as the
+    /// settings say.
     ///
     /// # Errors
     /// `NoQuorum` where nobody acknowledges it: nothing was entered. `OutcomeUnknown` where that is not known.
+    /// `MapElsewhere` where there is one of that name that other nodes hold.
     fn enter<'a>(&'a self, name: &'a MapName, new: NewMap) -> Later<'a, Result<bool, ServiceError>>;
 
     /// True where a map that this node has no copy of is listed, and it has one now: another node has just made it.
     /// Asks NATS a few times a second at most, however many ask.
     ///
     /// # Errors
-    /// `NoQuorum` where it is not known whether it is listed.
+    /// `NoQuorum` where it is not known whether it is listed; `MapElsewhere`, with their addresses, where other nodes
+    /// hold it.
     fn look_for<'a>(&'a self, name: &'a MapName) -> Later<'a, Result<bool, ServiceError>>;
+
+    /// The maps that other nodes hold and this one does not, by name, as far as this node knows.
+    fn held_elsewhere(&self) -> Vec<MapElsewhere>;
 
     /// Takes the map of this uuid out, for good: it is deleted on all nodes.
     ///

@@ -170,13 +170,13 @@ impl CommitQueue {
         self.lead.subscribe()
     }
 
-    /// The map is deleted: it takes no more changes.
-    pub(crate) fn end(&self) {
-        self.stopped.get_or_init(|| Stop::Deleted);
+    /// The map is gone from this server, for this reason: it takes no more changes.
+    pub(crate) fn end(&self, stop: Stop) {
+        self.stopped.get_or_init(|| stop);
         self.ended.send_replace(true);
     }
 
-    /// Waits until the map is deleted, replaced or renamed.
+    /// Waits until the map is deleted, replaced or renamed, or its copy dropped.
     pub(crate) async fn ended(&self) {
         // The sender is there as long as this is.
         drop(self.ended.subscribe().wait_for(|ended| *ended).await);

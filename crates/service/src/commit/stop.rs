@@ -22,6 +22,8 @@ pub(crate) enum Stop {
     Behind(String),
     /// The map was deleted.
     Deleted,
+    /// Other nodes hold the map, and this one does not any more.
+    HeldElsewhere,
     /// Another has its name now.
     Replaced,
     /// It has another name now, which whoever knows this one may not know.
@@ -44,6 +46,11 @@ impl Stop {
                 ServiceError::new(Reason::HistoriesDiffer, message)
             }
             Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
+            Self::HeldElsewhere => {
+                let message =
+                    format!("map {name} is not held by this node any more: ask again, and be sent on");
+                ServiceError::new(Reason::MapElsewhere, message)
+            }
             Self::Replaced => {
                 let message = format!("map {name} was replaced by another: ask for its map_uuid");
                 ServiceError::new(Reason::MapReplaced, message)

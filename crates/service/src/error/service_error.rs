@@ -3,10 +3,13 @@
 use std::time::Duration;
 
 use super::code::ErrorCode;
+use super::map_holder::MapHolder;
 use super::reason::Reason;
 use mrol_map::bloom::FilterSettingsError;
 use mrol_map::geometry::PoseError;
-use mrol_map::map::{FrustumError, KeepOutShapeError, MapSettingsError, NameError, PrismError, RegionError};
+use mrol_map::map::{
+    FrustumError, KeepOutShapeError, MapName, MapSettingsError, NameError, PrismError, RegionError,
+};
 use mrol_map::voxel::SettingError;
 
 /// A failed request: nothing was changed.
@@ -19,17 +22,27 @@ pub struct ServiceError {
     pub message: String,
     /// When the same request may be answered otherwise, where the server can tell.
     pub retry_after: Option<Duration>,
+    /// The nodes that are to be asked instead, for [`Reason::MapElsewhere`]: the first is the best.
+    pub holders: Vec<MapHolder>,
 }
 
 impl ServiceError {
     /// A failure for `reason`.
     pub fn new(reason: Reason, message: impl Into<String>) -> Self {
-        Self { reason, message: message.into(), retry_after: None }
+        Self { reason, message: message.into(), retry_after: None, holders: Vec::new() }
     }
 
     /// The server has too much to do: a limit, named in the message, would be exceeded.
     pub fn overloaded(message: impl Into<String>) -> Self {
         Self::new(Reason::Overloaded, message).retry_after(Duration::from_secs(1))
+    }
+
+    /// Other nodes hold the map, and this one does not.
+    pub fn map_elsewhere(name: &MapName, holders: Vec<MapHolder>) -> Self {
+        let at = |MapHolder { node, http, grpc }: &MapHolder| format!("node {node} ({http}, gRPC {grpc})");
+        let nodes: Vec<String> = holders.iter().map(at).collect();
+        let message = format!("map {name} is not held by this node: ask {}", nodes.join(", or "));
+        Self { holders, ..Self::new(Reason::MapElsewhere, message) }
     }
 
     /// What kind of failure it is.

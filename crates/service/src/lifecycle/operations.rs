@@ -7,11 +7,12 @@ use bytes::Bytes;
 
 use super::map_file::from_file;
 use crate::caller::AllowedMaps;
+use crate::commit::Stop;
 use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::maps::{HostedMap, RATE_SAMPLES, Saving, maps_at_once};
 use crate::observer::{Change, Outcome};
-use crate::request::{MapFile, MapInfo, MapsAwake, UnavailableMap};
+use crate::request::{MapElsewhere, MapFile, MapInfo, MapsAwake, UnavailableMap};
 use mrol_map::map::{MapName, MapSettings};
 use mrol_map::mapping::Sighting;
 use mrol_map::sync::polled_by_runtime;
@@ -128,6 +129,17 @@ impl MapService {
         self.inner.catalog.unavailable_within(&self.allowed_maps)
     }
 
+    /// The maps that other nodes of the cluster hold, by name: those that the caller may name and of which this node
+    /// has no copy.
+    pub fn maps_elsewhere(&self) -> Vec<MapElsewhere> {
+        let Some(cluster) = &self.inner.settings.cluster else { return Vec::new() };
+        let is_meant = |map: &MapElsewhere| {
+            let reachable = self.allowed_maps.check(&map.name);
+            reachable.is_ok_and(|reachable| !self.inner.catalog.has(&reachable))
+        };
+        cluster.catalog.held_elsewhere().into_iter().filter(is_meant).collect()
+    }
+
     /// Opens the maps of the data folder side by side, and serves each as soon as it is open; where maps sleep, they
     /// fall asleep as soon as they have been looked at. Not for an async thread.
     ///
@@ -177,7 +189,7 @@ impl MapService {
             }
             let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
             let name = self.allowed_maps.check(name)?;
-            run_to_completion(async move { inner.catalog.delete(&name, &asker).await }).await
+            run_to_completion(async move { inner.catalog.delete(&name, Stop::Deleted, &asker).await }).await
         };
         let outcome = |version: &_| Outcome::Changed(Change::of_map(Some(*version), None));
         self.observed("DeleteMap", Some(name), work, outcome).await.map(drop)

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use super::map_file::from_file;
 use super::operations::run_to_completion;
-use crate::commit::{Lead, Refusal, SharedAct, Submission};
+use crate::commit::{Lead, Refusal, SharedAct, Stop, Submission};
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
 use crate::maps::{BuiltMap, HostedMap, snapshot_bytes};
@@ -87,17 +87,30 @@ impl MapService {
         Ok(map.version_now())
     }
 
-    /// Deletes this node's copy of a map, if it is the one of this uuid.
+    /// Deletes this node's copy of a map that was deleted in the cluster, if it is the one of this uuid.
     ///
     /// # Errors
     /// As for [`MapService::delete_map`].
     pub async fn drop_copy(&self, name: &MapName, map_uuid: Uuid) -> Result<(), ServiceError> {
+        self.drop_copy_as(name, map_uuid, Stop::Deleted).await
+    }
+
+    /// Deletes this node's copy of a map that other nodes hold, if it is the one of this uuid: whoever waits for the
+    /// map hears `map_elsewhere`.
+    ///
+    /// # Errors
+    /// As for [`MapService::delete_map`].
+    pub async fn leave_to_others(&self, name: &MapName, map_uuid: Uuid) -> Result<(), ServiceError> {
+        self.drop_copy_as(name, map_uuid, Stop::HeldElsewhere).await
+    }
+
+    async fn drop_copy_as(&self, name: &MapName, map_uuid: Uuid, why: Stop) -> Result<(), ServiceError> {
         if self.uuid_of_copy(name).await? != Some(map_uuid) {
             return Ok(());
         }
         let (inner, asker) = (Arc::clone(&self.inner), self.asker.clone());
         let reachable = self.allowed_maps.check(name)?;
-        run_to_completion(async move { inner.catalog.delete(&reachable, &asker).await }).await.map(drop)
+        run_to_completion(async move { inner.catalog.delete(&reachable, why, &asker).await }).await.map(drop)
     }
 
     /// True of a copy that takes no changes since the log begins behind what it has: a newer copy is to take its place.

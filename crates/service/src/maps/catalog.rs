@@ -16,7 +16,7 @@ use super::node_mark::check_node;
 use super::opening::{find_all, maps_at_once, not_stored, waiting_within};
 use super::same_settings::same_settings;
 use crate::caller::{AllowedMaps, Reachable};
-use crate::commit::{CommitThreads, Lead};
+use crate::commit::{CommitThreads, Lead, Stop};
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::request::{MapVersion, UnavailableMap};
 use crate::settings::ServiceSettings;
@@ -278,10 +278,11 @@ impl Catalog {
         maps.open.insert(map.name.clone(), Arc::clone(map));
     }
 
-    /// Takes a map out; its last version.
+    /// Takes a map out, for the reason `why` that its callers are told; its last version.
     pub(crate) async fn delete(
         self: &Arc<Self>,
         name: &Reachable,
+        why: Stop,
         asker: &Asker,
     ) -> Result<MapVersion, ServiceError> {
         // Whoever has the turn waits for no map that is opened.
@@ -295,7 +296,7 @@ impl Catalog {
         if is_gone {
             self.maps.write().open.remove(&map.name);
             // Requests that still hold the map may read it, but nothing is kept of it any more.
-            map.commit_queue.end();
+            map.commit_queue.end(why);
         }
         let version = map.version_now();
         removed.map(|_| version).map_err(|error| match is_gone {
@@ -404,7 +405,7 @@ mod tests {
         assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX, &one)).await, busy);
         assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false, &one)).await, busy);
         assert_eq!(told(catalog.rename(&named("there"), &named("new"), &one)).await, busy);
-        assert_eq!(told(catalog.delete(&named("there"), &one)).await, busy);
+        assert_eq!(told(catalog.delete(&named("there"), Stop::Deleted, &one)).await, busy);
         // What is there already waits for nobody.
         assert!(!catalog.create(named("there"), settings, MAPS_MAX, &one).await.unwrap().1);
         drop(turn);

@@ -216,8 +216,9 @@ impl HostedMap {
         if self.followers.wait_for_revision(revision, wait_max, &self.commit_queue).await {
             return Ok(());
         }
-        if let Some(stop @ (Stop::Deleted | Stop::Replaced | Stop::Renamed)) = self.commit_queue.stopped() {
-            return Err(stop.refusal(&self.name));
+        match self.commit_queue.stopped() {
+            Some(Stop::Failed(_) | Stop::Diverged(_)) | None => {}
+            Some(stop) => return Err(stop.refusal(&self.name)),
         }
         let message = format!(
             "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
@@ -278,7 +279,7 @@ impl HostedMap {
     pub(crate) fn failure(&self) -> Option<&str> {
         match self.commit_queue.stopped()? {
             Stop::Failed(reason) | Stop::Diverged(reason) | Stop::Behind(reason) => Some(reason),
-            Stop::Deleted | Stop::Replaced | Stop::Renamed => None,
+            Stop::Deleted | Stop::HeldElsewhere | Stop::Replaced | Stop::Renamed => None,
         }
     }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use super::version::MapVersion;
+use crate::error::MapHolder;
 use mrol_map::map::{LevelInfo, MapName, MapSettings, RobotName};
 use mrol_map::mapping::Sighting;
 use mrol_map::util::Durations;
@@ -105,6 +106,17 @@ pub struct MapList {
     pub maps: Vec<MapInfo>,
     /// The maps that could not be opened.
     pub unavailable: Vec<UnavailableMap>,
+    /// The maps that other nodes of the cluster hold, and this one does not.
+    pub elsewhere: Vec<MapElsewhere>,
+}
+
+/// A map that other nodes of the cluster hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapElsewhere {
+    /// The map's name.
+    pub name: MapName,
+    /// Those of its holders that are live: the first is the best. None where none of them is.
+    pub holders: Vec<MapHolder>,
 }
 
 /// A map that could not be opened. Nothing can be done with it but to put its files right, and to start again.

@@ -22,7 +22,7 @@ pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget, NotSeenSince};
 pub use event::{EventMessage, EventsQuery, FailedScan, ScanEvent};
 pub use keep_out::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
-pub use map::{MapFile, MapInfo, MapList, MapStorage, MapsAwake, UnavailableMap};
+pub use map::{MapElsewhere, MapFile, MapInfo, MapList, MapStorage, MapsAwake, UnavailableMap};
 pub use observers::{ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan};
 pub use occupancy::{ListingRequest, PointAnswer, PointQuery, VoxelListing};
 pub use point_cloud::PointCloud;

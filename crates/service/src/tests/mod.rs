@@ -1,5 +1,6 @@
 //! Tests of the service as a whole.
 
+mod elsewhere;
 mod forwarding;
 mod leading;
 mod looks;

@@ -13,8 +13,8 @@ use crate::error::{Reason, ServiceError};
 use crate::map_service::MapService;
 use crate::replication::{MemoryLog, NodeLog, NodeName};
 use crate::request::{
-    DeleteKeepOut, Deletion, DeletionAnswer, EventsQuery, KeepOutAnswer, PutKeepOut, ScanAnswer, ScanEvent,
-    ScanRequest, Undo, UndoAnswer,
+    DeleteKeepOut, Deletion, DeletionAnswer, EventsQuery, KeepOutAnswer, MapElsewhere, PutKeepOut,
+    ScanAnswer, ScanEvent, ScanRequest, Undo, UndoAnswer,
 };
 use crate::settings::ServiceSettings;
 use mrol_map::geometry::{Point, Pose};
@@ -236,6 +236,10 @@ impl SharedCatalog for NoCatalog {
 
     fn look_for<'a>(&'a self, _: &'a MapName) -> Later<'a, Result<bool, ServiceError>> {
         Box::pin(std::future::ready(Ok(false)))
+    }
+
+    fn held_elsewhere(&self) -> Vec<MapElsewhere> {
+        Vec::new()
     }
 
     fn delete<'a>(&'a self, _: &'a MapName, _: Uuid) -> Later<'a, Result<(), ServiceError>> {

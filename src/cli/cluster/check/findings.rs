@@ -211,7 +211,8 @@ fn problems_of(map: &SeenMap, seen: &Overview) -> Vec<Finding> {
             "{name}: the copy of node {node} has parted from the log: `mrol cluster keep NODE {name}` makes one copy the map"
         ));
     }
-    for node in seen.nodes.iter().filter(|node| node.is_live && map.copy(&node.node).is_none()) {
+    let holders = seen.nodes.iter().filter(|node| node.is_live && map.holders.contains(&node.node));
+    for node in holders.filter(|node| map.copy(&node.node).is_none()) {
         problems
             .push(format!("{name}: node {} has no copy that follows the log; its log says why", node.node));
     }

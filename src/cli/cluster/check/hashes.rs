@@ -23,7 +23,8 @@ pub(super) async fn compared(seen: &Overview, credentials: &Credentials, within:
     let (mut clients, mut findings) = (Vec::new(), Vec::new());
     for SeenNode { node, beat, .. } in seen.nodes.iter().filter(|node| node.is_live) {
         match Client::connect_with(&beat.grpc, credentials).await {
-            Ok(client) => clients.push((node.clone(), client.with_timeout(ANSWERED_WITHIN))),
+            // Each is asked for its own copy.
+            Ok(client) => clients.push((node.clone(), client.with_timeout(ANSWERED_WITHIN).not_sent_on())),
             Err(error) => {
                 findings.push(Finding::wrong(
                     "contents",
@@ -38,6 +39,12 @@ pub(super) async fn compared(seen: &Overview, credentials: &Credentials, within:
     }
     let until = Instant::now() + within;
     for map in &seen.maps {
+        let clients: Vec<_> = clients.iter().filter(|(node, _)| map.copy(node).is_some()).collect();
+        if clients.len() < 2 {
+            let detail = format!("map {} is on fewer than two nodes that were reached", map.name);
+            findings.push(Finding::unknown("contents", detail));
+            continue;
+        }
         let mut said = Said::new();
         let mut failure = None;
         loop {
