@@ -91,6 +91,8 @@ impl Membership {
     pub(super) fn begin(&self, service: &MapService, lifecycle: &Lifecycle) {
         let Some(Member { node, lag_max }) = self.0.clone() else { return };
         node.begin(service.clone());
+        // Before anybody can ask.
+        lifecycle.set_behind(node.is_behind(lag_max));
         let lifecycle = lifecycle.clone();
         lifecycle.set_behind(true);
         tokio::spawn(async move {

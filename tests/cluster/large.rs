@@ -144,6 +144,7 @@ impl<'a> Changes<'a> {
     fn timed<T>(&mut self, what: &'static str, change: impl FnOnce(&mut Self) -> T) -> T {
         let begun = Instant::now();
         let done = change(self);
+        println!("{what}: {:.2?}", begun.elapsed());
         self.took.push((what, begun.elapsed()));
         done
     }
@@ -260,6 +261,8 @@ fn large_changes_and_large_maps_are_on_all_nodes() {
     let begun = Instant::now();
     site.start_node(OTHER);
     site.wait_until_ready(OTHER);
+    let ready = [OTHER, 1].map(|node| site.state(node, &name("hall")).is_some_and(|it| it.voxels == of_hall));
+    assert_eq!(ready, [true; 2], "a node is ready before it has the map");
     let joined = begun.elapsed();
     let (most, has) = (memory(&site, OTHER, "VmHWM"), memory(&site, 1, "VmRSS"));
     println!(

@@ -160,8 +160,21 @@ impl Heart {
         let elsewhere = self.list.borrow().not_held_by(&self.settings.name);
         let then = if before.seen.is_some() { before } else { &*now };
         let is_behind = is_behind(own, then, &elsewhere);
+        drop(now);
+        // The beats of the others may be from before a map was made.
+        let is_joining = *self.lag.lock() == Lag::NotThereYet;
+        let is_behind = is_behind || (is_joining && self.lacks_a_map());
         let mut lag = self.lag.lock();
         *lag = lag.then(is_behind, Instant::now());
+    }
+
+    /// True where the list has a map of which this node has no copy, or is not known.
+    fn lacks_a_map(&self) -> bool {
+        let Ok((listing, _)) = self.joined.catalog.read() else { return true };
+        let copies: BTreeSet<Uuid> =
+            self.service.shared_maps().into_iter().map(|map| map.version.map_uuid).collect();
+        let mut held = listing.maps().filter(|(_, entry)| entry.holders().contains(&self.settings.name));
+        held.any(|(_, entry)| !copies.contains(&entry.uuid))
     }
 
     fn own_beat(&self) -> Beat {
