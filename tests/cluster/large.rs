@@ -1,5 +1,6 @@
-//! Large changes and large maps: all nodes have them, as a server by itself has. The long form prints how long each took
-//! beside such a server on the same disk, and has so much changed that bases are put and logs cut while a node is away.
+//! Large changes and large maps: all nodes have them, as a server by itself has. It prints how long each took beside
+//! such a server on the same disk. The long form has so much changed that bases are put and logs cut while a node is
+//! away.
 //!
 //! ```text
 //! MROL_CLUSTER_LARGE=1 NATS_SERVER_PROGRAM=$(.ci/nats-server) cargo test --release --test cluster large -- --nocapture
@@ -305,7 +306,8 @@ fn large_changes_and_large_maps_are_on_all_nodes() {
     }
 }
 
-/// So much is changed while a node is stopped that its place in the log is cut off; it is killed while it loads the base.
+/// So much is changed while a node is stopped that its place in the log is cut off; it is killed while it loads the
+/// base.
 fn behind_the_log(site: &mut Site, sizes: &Sizes, of_hall: usize) {
     site.signal(OTHER, "STOP");
     let two = [0, 1];

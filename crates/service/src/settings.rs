@@ -54,7 +54,8 @@ pub struct ServiceSettings {
     pub sleep_after: Option<Duration>,
     /// The other nodes of the cluster that this server is a node of; none of a server by itself.
     pub cluster: Option<Cluster>,
-    /// True to open a folder as well of which a cluster has adopted maps, and no node has opened it since: to adopt more.
+    /// True to open a folder as well of which a cluster has adopted maps, and which no node has opened since: to adopt
+    /// more.
     pub may_be_adopted: bool,
 }
 

@@ -42,8 +42,8 @@ pub(super) struct Entering {
 const LOOKED_FOR: Duration = Duration::from_millis(200);
 /// How long a request waits for a copy of a map that another node has just made.
 const COPIED_WITHIN: Duration = Duration::from_secs(5);
-/// How long this node may take to do its part of what is decided, and for a map that is not empty, whose file it fetches,
-/// reads and writes. How large that map is the size of its file does not say.
+/// How long this node may take to do its part of what is decided, and for a map that is not empty, whose file it
+/// fetches, reads and writes. The size of the file does not say how large that map is.
 const DONE_WITHIN: Duration = Duration::from_secs(20);
 const RESTORED_WITHIN: Duration = Duration::from_secs(180);
 /// Bytes of the file of an empty map, at most.

@@ -138,8 +138,8 @@ impl Keeper {
         self.service.copy_map(self.name.clone(), uuid, Bytes::from(file), replace).await.map(drop)
     }
 
-    /// Looks with each beat, and whenever the log names another node, whether this one is to lead; until the copy is gone,
-    /// or the log begins behind what it has.
+    /// Looks with each beat, and whenever the log names another node, whether this one is to lead; until the copy is
+    /// gone, or the log begins behind what it has.
     async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) -> Ended {
         let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid, self.bases);
         let (mut waited_since, mut release, mut beats_then) = (None, None, 0);

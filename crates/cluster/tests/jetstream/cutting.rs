@@ -1,5 +1,5 @@
-//! Nodes put bases of a map and cut its log while it changes; a node that was away for longer than the log reaches begins
-//! with the base.
+//! Nodes put bases of a map and cut its log while it changes; a node that was away for longer than the log reaches
+//! begins with the base.
 
 use std::time::Duration;
 
@@ -41,8 +41,8 @@ impl Kept {
         used.last_sequence - used.messages
     }
 
-    /// Has a map changed until its log begins behind a revision, which made no more messages than that; numbers of scans
-    /// go on from `number`.
+    /// Has a map changed until its log begins behind a revision, which made no more messages than that; numbers of
+    /// scans go on from `number`.
     fn write_until_cut_behind(&self, revision: u64, servers: &[&Server], map: &str, number: &mut u64) {
         waited("the log is cut", || {
             for _ in 0..10 {

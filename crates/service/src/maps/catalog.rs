@@ -130,6 +130,11 @@ impl Catalog {
             .collect()
     }
 
+    /// From now on a server by itself does not open the data folder: a cluster adopts maps of it.
+    pub(crate) fn note_adopted(&self) -> Result<(), ServiceError> {
+        self.data_dir.as_ref().map_or(Ok(()), |data_dir| data_dir.set_adopted().map_err(not_stored))
+    }
+
     /// Sees that no disk that hangs keeps the changes of other maps waiting; to be called every second or so.
     pub(crate) fn relieve_commits(&self) {
         self.commit_threads.relieve();

@@ -1,6 +1,5 @@
 //! A data folder is of a server by itself, or of one node of a cluster.
 
-use super::catalog::Catalog;
 use super::opening::not_stored;
 use crate::cluster::Cluster;
 use crate::error::{Reason, ServiceError};
@@ -32,11 +31,4 @@ pub(super) fn check_node(data_dir: &DataDir, settings: &ServiceSettings) -> Resu
         ),
     };
     Err(ServiceError::new(Reason::BadSettings, message))
-}
-
-impl Catalog {
-    /// From now on a server by itself does not open the data folder: a cluster adopts maps of it.
-    pub(crate) fn note_adopted(&self) -> Result<(), ServiceError> {
-        self.data_dir.as_ref().map_or(Ok(()), |data_dir| data_dir.set_adopted().map_err(not_stored))
-    }
 }

@@ -128,8 +128,9 @@ impl DataDir {
         self.folder(&entry, first).inspect_err(|_| self.leave(&entry))
     }
 
-    /// Creates a map in the place of `old` under its name `name`; the old map is renamed to `kept`. A newer state of the
-    /// same map would have the same folder: after a crash in between there is only the old one, under the name `kept`.
+    /// Creates a map in the place of `old` under its name `name`; the old map is renamed to `kept`. A newer state of
+    /// the same map would have the same folder: after a crash in between there is only the old one, under the name
+    /// `kept`.
     ///
     /// # Errors
     /// When the system refuses; in memory, all is then as it was. Where undoing a part of it failed too, the next start
