@@ -80,8 +80,8 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
     }
 }
 
-/// The node to which this one, which leads, gives the lead: the holder that is wished, and where this one is to hold the
-/// map no more, or writes what a live node cannot read, any holder whose records all can read, the furthest first.
+/// The node to which this one, which leads, gives the lead: the holder that is wished, and where this one is to hold
+/// the map no more, or writes what a live node cannot read, any holder whose records all can read, the furthest first.
 fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     let Known { view, map, .. } = *known;
     let Placement { holders, leader: wished } = known.placement;
@@ -128,9 +128,9 @@ fn furthest<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     further.max_by_key(|(_, head)| head.revision).map(|(node, _)| node)
 }
 
-/// True where every other live node has said how far it is since this one made its `claim`: it had read it, or beat later
-/// than this node after the claim. What it said before is no measure: the log may have lost its newest messages since. Nor
-/// is it that it said nothing of the map: it may have taken its copy since.
+/// True where every other live node has said how far it is since this one made its `claim`: it had read it, or beat
+/// later than this node after the claim. What it said before is no measure: the log may have lost its newest messages
+/// since. Nor is it that it said nothing of the map: it may have taken its copy since.
 fn all_have_heard(known: &Known<'_>, claim: Option<Uuid>) -> bool {
     let holders = &known.placement.holders;
     known.view.others.iter().filter(|(_, seen)| seen.is_live).all(|(node, seen)| {

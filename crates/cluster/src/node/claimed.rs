@@ -7,8 +7,8 @@ use uuid::Uuid;
 
 use super::view::View;
 
-/// How often a node that has claimed looks at the beats of the others, and how many times: they beat as soon as they have
-/// read its claim.
+/// How often a node that has claimed looks at the beats of the others, and how many times: they beat as soon as they
+/// have read its claim.
 pub(super) const LOOKED_EVERY: Duration = Duration::from_millis(100);
 const LOOKS_MAX: u32 = 20;
 
@@ -30,8 +30,8 @@ impl Claimed {
         if self.id != id {
             *self = Self { id, beats_before: view.all_beats, ..Self::default() };
         }
-        // The first that is acknowledged may have begun before the claim. Where an older copy of the bucket was put back,
-        // its revisions are smaller from then on.
+        // The first that is acknowledged may have begun before the claim. Where an older copy of the bucket was put
+        // back, its revisions are smaller from then on.
         if view.all_beats >= self.beats_before + 2 {
             self.at = Some(self.at.map_or(view.revision, |at| at.min(view.revision)));
         }

@@ -150,8 +150,8 @@ impl Heart {
         Ok(own)
     }
 
-    /// Notes whether this node is behind the others. What they had a beat ago is to be here by now; at the first beat it
-    /// is known what they have.
+    /// Notes whether this node is behind the others. What they had a beat ago is to be here by now; at the first beat
+    /// it is known what they have.
     fn note_lag(&self, own: &Beat, before: &View) {
         let now = self.view.borrow();
         if now.seen.is_none() {

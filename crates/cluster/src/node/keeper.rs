@@ -61,8 +61,8 @@ impl Keeper {
         }
     }
 
-    /// Takes a copy in where there is none, and shares it by its log, again and again until that is done; none where this
-    /// node has none and is to hold none.
+    /// Takes a copy in where there is none, and shares it by its log, again and again until that is done; none where
+    /// this node has none and is to hold none.
     async fn shared(&self) -> Option<Arc<JetStreamLog>> {
         let mut last_said = None;
         loop {

@@ -9,7 +9,8 @@
 //! 4. `lag`: whether it is where the others are.
 //! 5. `heart`: beats every two seconds, and sees who is gone.
 //! 6. `cutting`: puts a base and cuts the front of a log off.
-//! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads it where it is to.
+//! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads
+//!    it where it is to.
 //! 8. `keepers`: one for each map of the cluster's list that this node holds.
 //! 9. `entering`: enters maps into the list and deletes them, for the operations of the service.
 //! 10. `server`: [`Node`], which puts these together.

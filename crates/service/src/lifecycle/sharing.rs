@@ -175,8 +175,8 @@ impl MapService {
         }
     }
 
-    /// Claims to lead a shared map. `epoch` is that of [`Lead::Shared`] when this was chosen: where the log names another
-    /// node in a later one, that one is followed. With none, the claim comes after whoever leads by then.
+    /// Claims to lead a shared map. `epoch` is that of [`Lead::Shared`] when this was chosen: where the log names
+    /// another node in a later one, that one is followed. With none, the claim comes after whoever leads by then.
     ///
     /// # Errors
     /// As for [`MapService::share_map`]; `NotLeader` where another node was faster.
@@ -184,9 +184,9 @@ impl MapService {
         self.act_on(name, SharedAct::Claim { epoch }).await?.ok_or_else(went_on)
     }
 
-    /// Takes over a shared map by this node's claim, whose id [`Lead::Shared`] tells, and gives its log what only this node has. `live` are
-    /// the other nodes that are up and have not parted from the log, with the revisions that they had once they had read
-    /// the claim: a node that is behind one of them does not take over.
+    /// Takes over a shared map by this node's claim, whose id [`Lead::Shared`] tells, and gives its log what only this
+    /// node has. `live` are the other nodes that are up and have not parted from the log, with the revisions that they
+    /// had once they had read the claim: a node that is behind one of them does not take over.
     ///
     /// # Errors
     /// As for [`MapService::share_map`]; `NotLeader` where that was not the last claim, `NoQuorum` where another is

@@ -130,8 +130,8 @@ impl Member {
         self.reading.claim
     }
 
-    /// True where this node claimed last, and since it joined: an earlier process of its name, or one beside it, may have
-    /// claimed as well.
+    /// True where this node claimed last, and since it joined: an earlier process of its name, or one beside it, may
+    /// have claimed as well.
     pub(crate) fn has_claimed(&self) -> bool {
         self.reading.claim.is_some() && self.reading.claim == self.own_claim
     }

@@ -9,8 +9,8 @@ use mrol_store::Record;
 use uuid::Uuid;
 
 impl Worker {
-    /// Claims to lead. Whoever chose that it does may not have known of the last claims: where the log names another node
-    /// in an epoch after `epoch`, that one leads.
+    /// Claims to lead. Whoever chose that it does may not have known of the last claims: where the log names another
+    /// node in an epoch after `epoch`, that one leads.
     pub(super) fn claim(&mut self, epoch: Option<u64>) -> Result<(), ServiceError> {
         self.settle_and_catch_up()?;
         let revision = self.map.revision();
@@ -41,9 +41,9 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes over by its claim of this id: gives the log what only this node has, and makes changes from then on. The `live`
-    /// nodes have said how far they are after they had read the claim. A claim alone does not tell: where the log lost
-    /// its newest messages, what it has is no measure of what another node made.
+    /// Takes over by its claim of this id: gives the log what only this node has, and makes changes from then on. The
+    /// `live` nodes have said how far they are after they had read the claim. A claim alone does not tell: where the
+    /// log lost its newest messages, what it has is no measure of what another node made.
     pub(super) fn open(&mut self, claim: Option<Uuid>, live: &[(NodeName, u64)]) -> Result<(), ServiceError> {
         self.settle_and_catch_up()?;
         let revision = self.map.revision();
