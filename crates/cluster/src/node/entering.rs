@@ -42,12 +42,10 @@ pub(super) struct Entering {
 const LOOKED_FOR: Duration = Duration::from_millis(200);
 /// How long a request waits for a copy of a map that another node has just made.
 const COPIED_WITHIN: Duration = Duration::from_secs(5);
-/// How long this node may take to do its part of what is decided, and for a map that is not empty, whose file it
-/// fetches, reads and writes. The size of the file does not say how large that map is.
+/// How long this node may take to do its part of what is decided, and how much longer for each megabyte that a map file
+/// has before compression: it is fetched, read and written.
 const DONE_WITHIN: Duration = Duration::from_secs(20);
-const RESTORED_WITHIN: Duration = Duration::from_secs(180);
-/// Bytes of the file of an empty map, at most.
-const EMPTY_MAX: usize = 4 << 10;
+const LONGER_A_MEGABYTE: Duration = Duration::from_secs(2);
 /// How long a map that some nodes are to hold waits until it is known which of them are live: a node that was just
 /// started sees after four beats who is gone.
 const SETTLED_WITHIN: Duration = BEAT_EVERY.saturating_mul(6);
@@ -126,7 +124,7 @@ impl Entering {
     async fn enter_map(&self, name: &MapName, new: NewMap) -> Result<bool, ServiceError> {
         let (joined, of, uuid) = (self.joined()?, name.clone(), new.uuid);
         let holders = self.holders_of_new().await?;
-        let within = if new.file.len() > EMPTY_MAX { RESTORED_WITHIN } else { DONE_WITHIN };
+        let within = DONE_WITHIN + LONGER_A_MEGABYTE * (new.body_bytes() >> 20) as u32;
         let entered = blocking(move || -> Result<(Uuid, Option<MapEntry>), ServiceError> {
             let there = joined.enter(&of, &new, &holders).map_err(|error| match error {
                 EnterError::NotPut(why) => no_quorum(&why),

@@ -22,6 +22,13 @@ pub struct NewMap {
     pub file: Bytes,
 }
 
+impl NewMap {
+    /// Bytes of the file before compression: how much work it is to read it.
+    pub fn body_bytes(&self) -> u64 {
+        mrol_store::body_bytes(&self.file)
+    }
+}
+
 /// The list of maps that all nodes of a cluster share. A call that succeeds returns once this node has its own copy of
 /// the map, or none any more; the others follow within a beat.
 pub trait SharedCatalog: Debug + Send + Sync {
