@@ -30,9 +30,14 @@ struct State {
 }
 
 impl Link {
-    /// To a port of this machine.
+    /// From some port to a port of this machine.
     pub(crate) fn to(target: u16) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        Self::between(0, target)
+    }
+
+    /// From one port of this machine to another.
+    pub(crate) fn between(port: u16, target: u16) -> Self {
+        let listener = TcpListener::bind(("127.0.0.1", port)).unwrap();
         let port = listener.local_addr().unwrap().port();
         let state = Arc::<State>::default();
         let of_all = Arc::clone(&state);

@@ -1,7 +1,6 @@
 //! A site: three servers of NATS and three nodes, each a process of its own.
 
 use std::fs;
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -14,7 +13,7 @@ use tokio::runtime::Runtime;
 use uuid::Uuid;
 
 use crate::link::Link;
-use crate::nats::NatsServers;
+use crate::nats::{NatsServers, free_ports};
 
 pub(crate) const NODES: usize = 3;
 
@@ -50,12 +49,12 @@ impl Site {
     /// The same, with settings as variables.
     pub(crate) fn start_with(settings: &'static [(&'static str, &'static str)]) -> Option<Self> {
         let nats = NatsServers::start_apart(NODES)?;
-        let node = |_| {
-            let [http, grpc] = free_ports();
+        let node = |ports: &[u16]| {
+            let (http, grpc, linked) = (ports[0], ports[1], ports[2]);
             let to_nats = nats.ports().into_iter().map(Link::to).collect();
-            Node { http, grpc, to_nats, from_others: Link::to(grpc), process: None }
+            Node { http, grpc, to_nats, from_others: Link::between(linked, grpc), process: None }
         };
-        let nodes = (0..NODES).map(node).collect();
+        let nodes = free_ports(3 * NODES).chunks(3).map(node).collect();
         drop(nats.engine());
         let (folder, runtime) = (TempDir::new().unwrap(), Runtime::new().unwrap());
         let mut site = Self { nats, folder, nodes, runtime, settings };
@@ -93,7 +92,8 @@ impl Site {
 
     /// Starts a server by itself, whose data folder is beside those of the nodes.
     pub(crate) fn start_beside(&self) -> Alone {
-        let [http, grpc] = free_ports();
+        let ports = free_ports(2);
+        let (http, grpc) = (ports[0], ports[1]);
         let (data, log) = (self.folder.path().join("alone"), self.folder.path().join("alone.log"));
         let process = serve(&data, [http, grpc], &log).spawn().unwrap();
         Alone { process, grpc: format!("http://127.0.0.1:{grpc}") }
@@ -356,9 +356,4 @@ fn serve(data: &Path, [http, grpc]: [u16; 2], log: &Path) -> Command {
         .stdout(Stdio::null())
         .stderr(log);
     command
-}
-
-fn free_ports() -> [u16; 2] {
-    let listeners = [0; 2].map(|_| TcpListener::bind("127.0.0.1:0").unwrap());
-    listeners.map(|listener| listener.local_addr().unwrap().port())
 }

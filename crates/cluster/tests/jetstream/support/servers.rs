@@ -1,6 +1,8 @@
 //! NATS servers of a test, which it kills and starts again.
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -201,10 +203,19 @@ pub(crate) fn eventually<T, E: std::fmt::Display>(mut call: impl FnMut() -> Resu
     }
 }
 
-/// Ports that nobody listens at.
-fn free_ports(count: usize) -> Vec<u16> {
-    let listeners: Vec<_> = (0..count).map(|_| TcpListener::bind("127.0.0.1:0").unwrap()).collect();
-    listeners.iter().map(|listener| listener.local_addr().unwrap().port()).collect()
+/// Ports that nobody listens at. They are none of those that the kernel gives connections by itself: a server that is
+/// started again finds its own still free.
+pub(crate) fn free_ports(count: usize) -> Vec<u16> {
+    let mut listeners = BTreeMap::new();
+    while listeners.len() < count {
+        // Seeded anew in each process, and with each.
+        let number = RandomState::new().build_hasher().finish();
+        let port = 10_000 + (number % 22_000) as u16;
+        if let Ok(listener) = TcpListener::bind(("127.0.0.1", port)) {
+            listeners.insert(port, listener);
+        }
+    }
+    listeners.into_keys().collect()
 }
 
 fn copy_folder(from: &Path, to: &Path) {
