@@ -138,7 +138,7 @@ impl MapService {
     }
 
     /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it
-    /// makes what the log has, and takes changes only where it leads ([`MapService::lead_map`]). To be called before
+    /// makes what the log has, and takes changes only where it leads ([`MapService::claim_map`]). To be called before
     /// anybody may change the map. It stays in memory, under its name, until the server ends.
     ///
     /// # Errors
