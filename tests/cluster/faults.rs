@@ -157,9 +157,16 @@ fn node_disk_full(site: &mut Site, load: &Load, node: usize) {
     };
     site.start_node(node);
     settled(site, load, node);
-    disk.fill();
-    load.wait_for(100);
+    // The one that leads takes nothing that this node has no room for, and says so; it does once there is room.
+    disk.fill_but(3);
+    load.wait_until_refused(&format!("node n{node}"));
     disk.free();
+    load.wait_for(100);
+    // At once: its copy takes part no more, or it is waited for.
+    disk.fill();
+    sleep(Duration::from_secs(3));
+    disk.free();
+    load.wait_for(100);
     // What was not kept may need a new beginning.
     restart(site, load, node, Site::kill_node);
     load.set_up(node, false);

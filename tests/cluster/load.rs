@@ -24,6 +24,8 @@ pub(crate) struct Load {
     tasks: Vec<JoinHandle<()>>,
     /// When each writer's scans were acknowledged.
     acknowledged: Vec<Arc<Mutex<Vec<Instant>>>>,
+    /// What a writer was refused with last.
+    refused: Arc<Mutex<String>>,
     readers: Vec<Arc<Reads>>,
 }
 
@@ -41,12 +43,19 @@ impl Load {
     /// Begins: each writer has a list of all nodes, another one first, each reader one node.
     pub(crate) fn begin(site: &Site, map: &MapName) -> Self {
         let is_over = Arc::new(AtomicBool::new(false));
-        let mut this = Self { is_over, tasks: Vec::new(), acknowledged: Vec::new(), readers: Vec::new() };
+        let mut this = Self {
+            is_over,
+            tasks: Vec::new(),
+            acknowledged: Vec::new(),
+            refused: Arc::default(),
+            readers: Vec::new(),
+        };
         for writer in 0..WRITERS {
             let client = site.client(&site.all_grpc(writer % NODES));
             let acknowledged = Arc::<Mutex<Vec<Instant>>>::default();
             this.acknowledged.push(Arc::clone(&acknowledged));
-            let task = write(client, map.clone(), writer, Arc::clone(&this.is_over), acknowledged);
+            let refused = Arc::clone(&this.refused);
+            let task = write(client, map.clone(), writer, Arc::clone(&this.is_over), acknowledged, refused);
             this.tasks.push(site.runtime().spawn(task));
         }
         for node in 0..NODES {
@@ -75,6 +84,18 @@ impl Load {
                 "writers are not acknowledged: {wanted:?}, {:?}",
                 counts().collect::<Vec<_>>()
             );
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Waits until a writer is refused with such words.
+    #[track_caller]
+    pub(crate) fn wait_until_refused(&self, words: &str) {
+        self.refused.lock().unwrap().clear();
+        let begun = Instant::now();
+        while !self.refused.lock().unwrap().contains(words) {
+            let last = self.refused.lock().unwrap().clone();
+            assert!(begun.elapsed() < WITHIN, "nobody was refused with {words:?}, but: {last}");
             std::thread::sleep(Duration::from_millis(10));
         }
     }
@@ -118,6 +139,7 @@ async fn write(
     writer: usize,
     is_over: Arc<AtomicBool>,
     acknowledged: Arc<Mutex<Vec<Instant>>>,
+    refused: Arc<Mutex<String>>,
 ) {
     let robot = RobotName::new(&format!("writer-{writer}")).unwrap();
     let mut number = 0;
@@ -144,6 +166,7 @@ async fn write(
                 "overloaded",
             ];
             assert!(may_come_again.contains(&reason.as_str()), "writer {writer}: {error}");
+            *refused.lock().unwrap() = error.to_string();
             tokio::time::sleep(PAUSE).await;
         }
         acknowledged.lock().unwrap().push(Instant::now());

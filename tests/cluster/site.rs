@@ -327,6 +327,15 @@ impl SmallDisk {
         assert!(filled.is_err(), "it is larger than it should be");
     }
 
+    /// Takes all but so many megabytes.
+    pub(crate) fn fill_but(&self, megabytes: usize) {
+        let df =
+            Command::new("df").args(["--block-size=1M", "--output=avail"]).arg(&self.0).output().unwrap();
+        let said = String::from_utf8(df.stdout).unwrap();
+        let free: usize = said.lines().last().unwrap().trim().parse().unwrap();
+        fs::write(self.0.join("filler"), vec![1; (free - megabytes) << 20]).unwrap();
+    }
+
     /// Gives back what was taken.
     pub(crate) fn free(&self) {
         fs::remove_file(self.0.join("filler")).unwrap();

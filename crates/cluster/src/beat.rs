@@ -21,6 +21,9 @@ pub struct Beat {
     pub maps: BTreeMap<Uuid, MapHead>,
     /// Bytes that its disk has left.
     pub free_bytes: u64,
+    /// Why the node takes nothing that makes maps grow: `disk_full` or `memory_full`; none where it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_room: Option<String>,
     /// True of the last beat of a node that was told to end: nobody waits for it.
     #[serde(default)]
     pub has_ended: bool,
@@ -72,6 +75,7 @@ mod tests {
             record_version: 5,
             maps,
             free_bytes: 1 << 40,
+            no_room: None,
             has_ended: false,
         };
         let text = serde_json::to_string(&beat).unwrap();

@@ -41,7 +41,7 @@ mod watch;
 mod work;
 
 pub use caller::{AllowedMaps, AllowedScans};
-pub use cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, SharedCatalog};
+pub use cluster::{Cluster, Forward, ForwardedCall, ForwardedEvents, Later, NewMap, NoRoom, SharedCatalog};
 pub use commit::Lead;
 pub use error::{ErrorCode, MapHolder, Reason, ReportedBy, ServiceError};
 pub use lifecycle::SharedMap;

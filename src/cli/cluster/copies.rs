@@ -157,6 +157,7 @@ mod tests {
             record_version: 0,
             maps: BTreeMap::new(),
             free_bytes: 0,
+            no_room: None,
             has_ended: false,
         };
         let copy = |&(node, is_live, has_copy, is_parted): &(&str, bool, bool, bool)| {

@@ -90,6 +90,7 @@ mod tests {
                 record_version: 1,
                 maps: BTreeMap::new(),
                 free_bytes: 0,
+                no_room: None,
                 has_ended: !is_live,
             },
         };

@@ -169,6 +169,7 @@ mod tests {
             record_version: 0,
             maps: BTreeMap::new(),
             free_bytes: 0,
+            no_room: None,
             has_ended: false,
         };
         let node = |name: &str| NodeName::new(name).unwrap();

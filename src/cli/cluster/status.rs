@@ -49,6 +49,8 @@ struct NodeRow {
     record_version: u32,
     http: String,
     grpc: String,
+    /// Why maps that the node holds do not grow.
+    no_room: Option<String>,
     /// None where the node does not know.
     free_bytes: Option<u64>,
 }
@@ -90,6 +92,13 @@ impl Report {
             let seconds = OverviewReader::SILENT_AFTER.as_secs();
             format!("node {} is SILENT: no beat within {seconds} s", node.node)
         });
+        let full = self.nodes.iter().filter(|node| node.live).filter_map(|node| {
+            let (name, why) = (&node.node, node.no_room.as_ref()?);
+            Some(format!(
+                "node {name} has NO ROOM ({why}): maps that it holds do not grow; make room there, or take maps off it \
+                 (`mrol cluster copies`)"
+            ))
+        });
         let maps = self.maps.iter().flat_map(|map| {
             let name = &map.map;
             let unled = map.leader.is_none().then(|| {
@@ -104,7 +113,7 @@ impl Report {
             });
             unled.into_iter().chain(parted)
         });
-        none.into_iter().chain(silent).chain(maps).collect()
+        none.into_iter().chain(silent).chain(full).chain(maps).collect()
     }
 }
 
@@ -114,6 +123,7 @@ impl NodeRow {
             node: node.to_string(),
             live: *is_live,
             ended: beat.has_ended,
+            no_room: beat.no_room.clone(),
             version: beat.version.clone(),
             record_version: beat.record_version,
             http: beat.http.clone(),
@@ -210,6 +220,7 @@ mod tests {
             node: node.into(),
             live,
             ended: node == "d",
+            no_room: (node == "a").then(|| "disk_full".to_owned()),
             version: "0.2.0".into(),
             record_version: 5,
             http: "http://a:7333".into(),
@@ -242,6 +253,7 @@ mod tests {
             "hall  a       any     all      3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
             "yard  NONE    any     all      3      20        no copies",
             "node b is SILENT: no beat within 3 s",
+            "node a has NO ROOM (disk_full)",
             "NO NODE LEADS map yard",
             "map hall: the copy of node c has PARTED",
         ] {

@@ -185,6 +185,7 @@ mod tests {
                 record_version: 7,
                 maps: revision.map(head).into_iter().collect(),
                 free_bytes: 0,
+                no_room: None,
                 has_ended: false,
             };
             (node(name), Seen { beat, revision: 20, is_live })

@@ -181,7 +181,8 @@ impl Heart {
         let NodeSettings { http, grpc, version, record_version, .. } = self.settings.clone();
         let free_bytes = self.service.measure().disk_free_bytes.unwrap_or(u64::MAX);
         let maps = self.service.shared_maps().into_iter().filter_map(head_of).collect();
-        Beat { http, grpc, version, record_version, maps, free_bytes, has_ended: false }
+        let no_room = self.service.shortages().first().map(|shortage| shortage.reason().as_str().to_owned());
+        Beat { http, grpc, version, record_version, maps, free_bytes, no_room, has_ended: false }
     }
 }
 

@@ -186,6 +186,10 @@ impl Keeper {
                 claimed_at: claimed.at,
                 record_version: self.record_version,
             };
+            let no_room = view.without_room(self.uuid);
+            if self.service.set_no_room(&self.name, no_room).await.is_err() {
+                return Ended::Gone;
+            }
             let choice = choose(&known);
             self.act(choice, &view, &now).await;
             if let Lead::Shared { is_here: true, sequence, .. } = &now {

@@ -86,6 +86,7 @@ mod tests {
                 record_version: 1,
                 maps: revision.map(head).into_iter().collect(),
                 free_bytes: 0,
+                no_room: None,
                 has_ended: false,
             };
             (node(name), Seen { beat, revision: beat_revision, is_live })

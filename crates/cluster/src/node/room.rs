@@ -41,6 +41,7 @@ mod tests {
                 record_version: 1,
                 maps: (0..maps).map(|map| (Uuid::from_u128(map as u128), head)).collect(),
                 free_bytes,
+                no_room: None,
                 has_ended: false,
             };
             (name(node), Seen { beat, revision: 1, is_live })

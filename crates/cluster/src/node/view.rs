@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use mrol_service::replication::NodeName;
+use mrol_service::{NoRoom, Reason};
 use uuid::Uuid;
 
 use crate::beat::{Beat, MapHead};
@@ -42,6 +43,17 @@ impl View {
         let live = self.others.iter().filter(|(_, seen)| seen.is_live);
         live.filter_map(move |(node, seen)| {
             Some((node, seen.beat.maps.get(&map).filter(|it| !it.is_parted)?))
+        })
+    }
+
+    /// A live node that holds a map and has no room for more of it.
+    pub(super) fn without_room(&self, map: Uuid) -> Option<NoRoom> {
+        self.holders(map).find_map(|(node, _)| {
+            let reason = match self.others[node].beat.no_room.as_deref()? {
+                "memory_full" => Reason::MemoryFull,
+                _ => Reason::DiskFull,
+            };
+            Some(NoRoom { node: node.clone(), reason })
         })
     }
 

@@ -19,6 +19,7 @@ fn beat(revision: u64) -> Beat {
             MapHead { revision, epoch: 2, claim: None, sequence: revision, leads: false, is_parted: false },
         )]),
         free_bytes: 1 << 30,
+        no_room: None,
         has_ended: false,
     }
 }

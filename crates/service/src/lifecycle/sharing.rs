@@ -8,6 +8,7 @@ use uuid::Uuid;
 
 use super::map_file::from_file;
 use super::operations::run_to_completion;
+use crate::cluster::NoRoom;
 use crate::commit::{Lead, Refusal, SharedAct, Stop, Submission};
 use crate::error::{ErrorCode, Reason, ServiceError};
 use crate::map_service::{MapService, commit_thread_ended};
@@ -135,6 +136,16 @@ impl MapService {
     /// `NotFound` without such a map.
     pub async fn lead_of(&self, name: &MapName) -> Result<watch::Receiver<Lead>, ServiceError> {
         Ok(self.map_here(name).await?.commit_queue.lead())
+    }
+
+    /// Says which other node that holds a map has no room for more of it: what makes the map grow is refused here until
+    /// there is none.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn set_no_room(&self, name: &MapName, no_room: Option<NoRoom>) -> Result<(), ServiceError> {
+        self.map_here(name).await?.set_no_room(no_room);
+        Ok(())
     }
 
     /// From now on a log that other nodes read too orders the changes of a map, and this server is its node `node`: it

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use parking_lot::RwLock;
 use tokio::sync::oneshot;
 use uuid::Uuid;
 
@@ -11,6 +12,7 @@ use super::followers::Followers;
 use super::keep_out_expiry::KeepOutExpiry;
 use super::robots::Robots;
 use super::snapshots::Snapshots;
+use crate::cluster::NoRoom;
 use crate::commit::{CommitQueue, CommitThreads, Lead, Stop};
 use crate::error::{Reason, ServiceError};
 use crate::request::{MapInfo, MapStorage, MapVersion};
@@ -37,6 +39,8 @@ pub(crate) struct HostedMap {
     pub(crate) undo_lock: Arc<tokio::sync::Mutex<()>>,
     pub(super) snapshots: Snapshots,
     pub(crate) keep_out_expiry: KeepOutExpiry,
+    /// Another node that holds the map and has no room for more of it.
+    no_room: RwLock<Option<NoRoom>>,
     last_use: LastUse,
 }
 
@@ -135,6 +139,7 @@ impl HostedMap {
             undo_lock: Arc::default(),
             snapshots: Snapshots::default(),
             keep_out_expiry: KeepOutExpiry::default(),
+            no_room: RwLock::default(),
             last_use: LastUse { opened: Instant::now(), at_ms: AtomicU64::new(0) },
         }
     }
@@ -178,6 +183,17 @@ impl HostedMap {
     pub(super) fn close(self) -> Closed {
         let Self { commit_queue, robots, .. } = self;
         Closed { robots, done: commit_queue.close() }
+    }
+
+    /// Says which other node that holds the map has no room for more of it.
+    pub(crate) fn set_no_room(&self, no_room: Option<NoRoom>) {
+        *self.no_room.write() = no_room;
+    }
+
+    /// # Errors
+    /// `DiskFull` and `MemoryFull` where another node that holds the map has no room for more of it.
+    pub(crate) fn check_room_elsewhere(&self) -> Result<(), ServiceError> {
+        self.no_room.read().as_ref().map_or(Ok(()), |no_room| Err(no_room.refusal(&self.name)))
     }
 
     /// Refuses changes that would be refused in the end, before any work is done for them.

@@ -77,6 +77,7 @@ impl MapService {
         scan.check_points(self.limits())?;
         if map.is_new(scan) {
             self.inner.budget.check_to_grow()?;
+            map.check_room_elsewhere()?;
         }
         let Lanes { mapping, long_mapping, .. } = &self.inner.lanes;
         let requester = self.asker.for_robot(&scan.robot);

@@ -61,6 +61,7 @@ impl HostedMap {
         self.check_voxels(settings)?;
         self.check_robots(&request.robot, &settings.limits)?;
         budget.check_to_grow()?;
+        self.check_room_elsewhere()?;
         let recovers = settings.recovers(request);
         let mapper = self.mapper(request.method, recovers, settings).carving(settings.carving(request));
         let RobotSettings { odometry, mount, .. } = settings.of_robot(&request.robot);

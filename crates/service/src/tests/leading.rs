@@ -1,8 +1,11 @@
 //! Who leads a map that several nodes share.
 
 use super::two_nodes::{TwoNodes, scan_of};
+use crate::cluster::NoRoom;
 use crate::commit::Lead;
 use crate::error::Reason;
+use crate::request::{Deletion, DeletionTarget, ScanRequest};
+use mrol_map::geometry::Point;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_node_that_chose_to_lead_before_it_knew_that_another_does_follows_it() {
@@ -48,4 +51,23 @@ async fn a_claim_changes_nothing_before_the_others_are_known_to_have_no_more() {
     assert_eq!(too_late.reason, Reason::NotLeader, "{too_late}");
     nodes.a.lead(&nodes.map).await;
     assert!(nodes.a.service.insert_scan(&nodes.map, scan_of("r", 0.05)).await.unwrap().accepted);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn where_another_node_has_no_room_the_map_does_not_grow_and_is_told_by_whom() {
+    let nodes = TwoNodes::led_by_a().await;
+    let (service, map) = (&nodes.a.service, &nodes.map);
+    let made = ScanRequest { scan_id: Some(7), ..scan_of("r", 0.05) };
+    assert!(service.insert_scan(map, made.clone()).await.unwrap().accepted);
+    let no_room = NoRoom { node: nodes.b.name.clone(), reason: Reason::DiskFull };
+    service.set_no_room(map, Some(no_room)).await.unwrap();
+    let refused = service.insert_scan(map, scan_of("r", 1.05)).await.unwrap_err();
+    assert_eq!((refused.reason, refused.message.contains("node b")), (Reason::DiskFull, true), "{refused}");
+    // What was made is known, and what makes room is made.
+    assert!(service.insert_scan(map, made).await.unwrap().accepted);
+    let target = DeletionTarget::Points(vec![Point::new(0.05, 0.05, 0.05)].into());
+    let deletion = Deletion { target, level: 0, request_id: None };
+    assert_eq!(service.delete_voxels(map, deletion).await.unwrap().removed, 1);
+    service.set_no_room(map, None).await.unwrap();
+    assert!(service.insert_scan(map, scan_of("r", 1.05)).await.unwrap().accepted);
 }

@@ -238,6 +238,7 @@ mod tests {
             record_version,
             maps: BTreeMap::from([(Uuid::nil(), head)]),
             free_bytes,
+            no_room: None,
             has_ended: false,
         };
         SeenNode { node: NodeName::new(name).unwrap(), is_live: true, beat }
