@@ -14,6 +14,7 @@ use mrol::store::OpeningProgress;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::nats::copy_folder;
 use crate::site::{MapState, NODES, Site, WITHIN, program};
 
 /// The node whose folder is one of a former release.
@@ -30,18 +31,6 @@ fn released() -> Vec<PathBuf> {
         entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect();
     folders.sort();
     folders
-}
-
-fn copy_folder(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let to = to.join(entry.file_name());
-        match entry.file_type().unwrap().is_dir() {
-            true => copy_folder(&entry.path(), &to),
-            false => drop(fs::copy(entry.path(), to).unwrap()),
-        }
-    }
 }
 
 /// How a server by itself has the map of a copy of a folder.

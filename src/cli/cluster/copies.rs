@@ -140,8 +140,6 @@ impl Display for Copies {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use mrol_cluster::{Beat, MapCopy, MapHead, SeenMap, SeenNode};
     use uuid::Uuid;
 
@@ -150,16 +148,7 @@ mod tests {
     /// Nodes: name, whether it is live, whether it has a copy of map `hall`, whether that has parted.
     fn overview(nodes: &[(&str, bool, bool, bool)]) -> Overview {
         let name = |name: &str| NodeName::new(name).unwrap();
-        let beat = Beat {
-            http: String::new(),
-            grpc: String::new(),
-            version: String::new(),
-            record_version: 0,
-            maps: BTreeMap::new(),
-            free_bytes: 0,
-            no_room: None,
-            has_ended: false,
-        };
+        let beat = Beat::default();
         let copy = |&(node, is_live, has_copy, is_parted): &(&str, bool, bool, bool)| {
             let head = MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads: false, is_parted };
             has_copy.then(|| MapCopy { node: name(node), is_live, head })

@@ -72,8 +72,6 @@ impl Display for Forgotten {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use mrol_cluster::{Beat, SeenNode};
 
     use super::*;
@@ -84,14 +82,10 @@ mod tests {
             node: NodeName::new(name).unwrap(),
             is_live,
             beat: Beat {
-                http: String::new(),
                 grpc: "http://10.0.0.1:7334".to_owned(),
-                version: String::new(),
                 record_version: 1,
-                maps: BTreeMap::new(),
-                free_bytes: 0,
-                no_room: None,
                 has_ended: !is_live,
+                ..Beat::default()
             },
         };
         let seen = Overview { nodes: vec![seen("n1", true), seen("n2", false)], maps: Vec::new() };

@@ -153,8 +153,6 @@ impl Display for Moved {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use mrol_cluster::{Beat, Holders, MapCopy, MapHead, SeenMap, SeenNode};
     use uuid::Uuid;
 
@@ -162,16 +160,7 @@ mod tests {
 
     /// Nodes with a copy of map `hall`: name, whether it is live, revision, whether it leads, whether it has parted.
     fn overview(nodes: &[(&str, bool, Option<u64>, bool, bool)]) -> Overview {
-        let beat = Beat {
-            http: String::new(),
-            grpc: String::new(),
-            version: String::new(),
-            record_version: 0,
-            maps: BTreeMap::new(),
-            free_bytes: 0,
-            no_room: None,
-            has_ended: false,
-        };
+        let beat = Beat::default();
         let node = |name: &str| NodeName::new(name).unwrap();
         let copy = |&(name, is_live, revision, leads, is_parted): &(&str, bool, Option<u64>, bool, bool)| {
             let head = MapHead { revision: revision?, epoch: 1, claim: None, sequence: 0, leads, is_parted };

@@ -178,16 +178,8 @@ mod tests {
                 };
                 (MAP, head)
             };
-            let beat = Beat {
-                http: String::new(),
-                grpc: String::new(),
-                version: String::new(),
-                record_version: 7,
-                maps: revision.map(head).into_iter().collect(),
-                free_bytes: 0,
-                no_room: None,
-                has_ended: false,
-            };
+            let beat =
+                Beat { record_version: 7, maps: revision.map(head).into_iter().collect(), ..Beat::default() };
             (node(name), Seen { beat, revision: 20, is_live })
         };
         let others = others.iter().map(seen).collect::<BTreeMap<_, _>>();

@@ -79,16 +79,8 @@ mod tests {
                     MapHead { revision, epoch: 1, claim: None, sequence: revision, leads: false, is_parted },
                 )
             };
-            let beat = Beat {
-                http: String::new(),
-                grpc: String::new(),
-                version: String::new(),
-                record_version: 1,
-                maps: revision.map(head).into_iter().collect(),
-                free_bytes: 0,
-                no_room: None,
-                has_ended: false,
-            };
+            let beat =
+                Beat { record_version: 1, maps: revision.map(head).into_iter().collect(), ..Beat::default() };
             (node(name), Seen { beat, revision: beat_revision, is_live })
         };
         View { others: others.iter().map(seen).collect(), ..View::default() }

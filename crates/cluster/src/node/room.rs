@@ -35,14 +35,10 @@ mod tests {
             MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads: false, is_parted: false };
         let seen = |&(node, is_live, free_bytes, maps): &(&str, bool, u64, usize)| {
             let beat = Beat {
-                http: String::new(),
-                grpc: String::new(),
-                version: String::new(),
                 record_version: 1,
                 maps: (0..maps).map(|map| (Uuid::from_u128(map as u128), head)).collect(),
                 free_bytes,
-                no_room: None,
-                has_ended: false,
+                ..Beat::default()
             };
             (name(node), Seen { beat, revision: 1, is_live })
         };

@@ -232,14 +232,11 @@ mod tests {
     fn node(name: &str, record_version: u32, free_bytes: u64, leads: bool) -> SeenNode {
         let head = MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads, is_parted: false };
         let beat = Beat {
-            http: String::new(),
-            grpc: String::new(),
             version: "0.2.0".to_owned(),
             record_version,
             maps: BTreeMap::from([(Uuid::nil(), head)]),
             free_bytes,
-            no_room: None,
-            has_ended: false,
+            ..Beat::default()
         };
         SeenNode { node: NodeName::new(name).unwrap(), is_live: true, beat }
     }

@@ -218,7 +218,8 @@ pub(crate) fn free_ports(count: usize) -> Vec<u16> {
     listeners.into_keys().collect()
 }
 
-fn copy_folder(from: &Path, to: &Path) {
+/// Copies a folder with all that is in it.
+pub(crate) fn copy_folder(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
