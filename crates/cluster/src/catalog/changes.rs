@@ -2,18 +2,19 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use mrol_map::map::MapName;
 use mrol_service::replication::NodeName;
+use parking_lot::Mutex;
 use uuid::Uuid;
 
 use super::error::CatalogError;
 use super::hints::Hints;
 use super::holders::Holders;
 use super::listing::Listing;
+use super::newest::{Newest, Read};
 use crate::bucket::{Bucket, BucketError};
 use crate::engine::{Engine, StreamError};
 
@@ -29,8 +30,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 #[derive(Debug, Clone)]
 pub struct Catalog {
     bucket: Bucket,
-    /// The greatest revision that was seen: what is older comes from a server that lags.
-    seen: Arc<AtomicU64>,
+    newest: Arc<Mutex<Newest>>,
 }
 
 impl Catalog {
@@ -40,7 +40,7 @@ impl Catalog {
     /// Says what NATS said.
     pub fn create(engine: &Engine) -> Result<Self, StreamError> {
         let bucket = Bucket::create(engine, "mrol-catalog")?;
-        Ok(Self { bucket, seen: Arc::default() })
+        Ok(Self { bucket, newest: Arc::default() })
     }
 
     /// What wakes whoever follows the list.
@@ -48,16 +48,19 @@ impl Catalog {
         Hints::of(engine, self.bucket.subject(KEY))
     }
 
-    /// The list and its revision, which grows with each change: never an older one than was seen before.
+    /// The list and its revision, which grows with each change: no older one than was seen before, unless all that is
+    /// read is older for ten seconds, since an older copy was put back.
     ///
     /// # Errors
     /// Nobody answered, or only a server that lags; or what is there is no list.
     pub fn read(&self) -> Result<(Listing, u64), CatalogError> {
         let entry = self.bucket.read(KEY).map_err(|error| CatalogError::Unavailable(error.to_string()))?;
         let revision = entry.as_ref().map_or(0, |entry| entry.revision);
-        let seen = self.seen.fetch_max(revision, Ordering::AcqRel);
-        if revision < seen {
-            return Err(CatalogError::Unavailable("a server lags".to_owned()));
+        let read = self.newest.lock().read(revision, Instant::now());
+        match read {
+            Read::List => {}
+            Read::PutBack => tracing::warn!(revision, "an older copy of the list of maps was put back"),
+            Read::Late => return Err(CatalogError::Unavailable("a server lags".to_owned())),
         }
         let Some(entry) = entry else { return Ok((Listing::default(), 0)) };
         let listing = serde_json::from_slice(&entry.value);
@@ -172,7 +175,7 @@ impl Catalog {
                 BucketError::Changed => Attempt::Overtaken,
                 error @ BucketError::Unavailable { .. } => Attempt::NotAcknowledged(error.to_string()),
             })?;
-            self.seen.fetch_max(put, Ordering::AcqRel);
+            self.newest.lock().made(put);
         }
         Ok(answer)
     }

@@ -52,7 +52,7 @@ pub(super) struct Known<'a> {
 
 /// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart
 /// by the log. It is made so that one claims as a rule, and soon. A node that is to hold the map no more claims
-/// nothing, and leads until a holder can take over.
+/// nothing that it is not given, and leads until a holder can take over.
 pub(super) fn choose(known: &Known<'_>) -> Choice {
     match known.lead {
         Lead::Shared { is_here: true, .. } => match successor(known) {
@@ -385,7 +385,13 @@ mod tests {
             chosen_of(Holders::Only(holders.iter().map(|name| node(name)).collect()), lead, others, 9, wished)
         };
         let (led, followed) = (led_by(Some("b"), true), led_by(Some("b"), false));
-        assert_eq!(chosen(&["a", "c"], &followed, &[], None), Choice::Stay);
+        let gone = [("a", false, Some(5), false)];
+        assert_eq!(chosen(&["a", "c"], &led_by(Some("a"), false), &gone, None), Choice::Stay);
+        assert_eq!(
+            chosen(&["a", "c"], &followed, &gone, None),
+            Choice::Claim,
+            "it is named, and has what there is"
+        );
         assert_eq!(chosen(&["b", "c"], &followed, &[], None), Choice::Claim);
         let both = [("a", true, Some(5), false), ("c", true, Some(5), false)];
         assert_eq!(chosen(&["a", "c"], &led, &both, None), Choice::HandOver(node("a")));
