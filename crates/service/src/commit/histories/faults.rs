@@ -48,12 +48,16 @@ fn made(history: &mut History, node: usize, numbers: &[i32]) {
 fn begun() -> History {
     let mut history = History::new(1, None);
     (0..NODES).for_each(|node| history.start(node).unwrap());
+    with_large_messages(&mut history);
+    history
+}
+
+fn with_large_messages(history: &mut History) {
     for node in &mut history.nodes {
         let member = &mut node.process.as_mut().unwrap().worker.member;
         let all = member.take().unwrap().with_pieces_of(100_000);
         *member = Some(all);
     }
-    history
 }
 
 fn has(history: &History, node: usize, number: i32) -> bool {
@@ -395,4 +399,32 @@ fn a_change_that_was_decided_on_before_another_node_made_changes_is_decided_on_a
     let now = process.map.revision();
     let other = process.commit(vec![prepared_at(now, change_of(2, false))]).remove(0);
     assert!(other.is_ok(), "{other:?}");
+}
+
+#[test]
+fn a_node_that_went_down_amid_the_changes_of_a_message_goes_on_with_the_rest() {
+    for writes in 0..24 {
+        // The node keeps no records that its snapshot holds: of what was before, nothing is left to compare.
+        let mut history = History::of_two_faults(1, true);
+        (0..NODES).for_each(|node| history.start(node).unwrap());
+        with_large_messages(&mut history);
+        lead(&mut history, 0).unwrap();
+        for number in 0..10 {
+            made(&mut history, 0, &[number]);
+            follow(&mut history, 1).unwrap();
+            let process = history.nodes[1].process.as_ref().unwrap();
+            if number < 9 {
+                process.folder.save(&Snapshot::of(&process.map, MAP), u64::MAX).unwrap();
+                process.folder.give_up_undo().unwrap();
+            }
+        }
+        made(&mut history, 0, &[10, 11, 12, 13]);
+        history.nodes[1].disk.set_fault(Some(simulated::Fault::FallsShort(writes)));
+        drop(follow(&mut history, 1));
+        history.nodes[1].process = None;
+        history.nodes[1].disk.set_fault(None);
+        history.start(1).unwrap();
+        follow(&mut history, 1).unwrap_or_else(|error| panic!("after {writes} writes: {error:?}"));
+        assert!((0..14).all(|number| has(&history, 1, number)), "after {writes} writes");
+    }
 }

@@ -82,11 +82,21 @@ impl Worker {
 impl OwnHistory {
     /// The node's own record of a revision, where it is kept; the revisions that are asked for ascend.
     pub(super) fn record_of(&mut self, revision: u64, worker: &Worker) -> Option<Record> {
+        // Nothing is opened for each of thousands that are not kept.
+        if worker.folder.as_ref()?.used().kept_from > revision {
+            return None;
+        }
         if self.records.is_none() || self.next != revision {
             self.records = Some(worker.own_records(revision)?);
         }
         self.next = revision + 1;
-        let (_, stored) = self.records.as_mut()?.next()?.ok()?;
-        Some(stored.into())
+        match self.records.as_mut()?.next() {
+            Some(Ok((there, stored))) if there == revision => Some(stored.into()),
+            // It is not kept. The next one may be.
+            _ => {
+                self.records = None;
+                None
+            }
+        }
     }
 }
