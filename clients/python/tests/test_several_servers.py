@@ -308,6 +308,19 @@ def test_a_request_is_not_sent_on_to_a_stranger(where: str) -> None:
         assert (first.requests, other.requests, stranger.requests) == (1, 0, 0)
 
 
+def test_a_request_is_sent_on_to_the_one_of_those_that_are_named_that_is_known() -> None:
+    with (
+        ScriptedServer(answering(answer(b'{"maps":[]}'))) as stranger,
+        ScriptedServer(answering(answer(b'{"maps":[]}'))) as other,
+        ScriptedServer(lambda sock, _: sock.sendall(named)) as first,
+    ):
+        holders = [{"node": "n", "http": f"http://{at.address}", "grpc": ""} for at in (stranger, other)]
+        problem = {"code": "unavailable", "reason": "map_elsewhere", "detail": "there", "elsewhere": [*holders, {"http": 1}]}
+        named = answer(json.dumps(problem).encode(), f"location: http://{stranger.address}/v1/maps".encode(), status=REDIRECT)
+        mrol.connect([first.address, other.address], patience_s=0).maps()
+        assert (first.requests, other.requests, stranger.requests) == (1, 1, 0)
+
+
 def test_a_request_is_sent_on_three_times_at_most() -> None:
     with (
         ScriptedServer(lambda sock, _: sock.sendall(sent_on(f"http://{second.address}"))) as first,

@@ -60,7 +60,11 @@ impl Elsewhere {
             ClientError::Refused { elsewhere, .. } => elsewhere.as_slice(),
             _ => &[],
         };
-        named.iter().map(String::as_str).filter(move |address| address.starts_with(scheme))
+        // No server has a user and a password in its address.
+        named
+            .iter()
+            .map(String::as_str)
+            .filter(move |address| address.starts_with(scheme) && !address.contains('@'))
     }
 
     /// True once a map was found elsewhere.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::nats::NatsOptions;
 use mrol::console::parse;
 use mrol::console::{CliError, Output};
-use mrol_cluster::{NodeBeat, Overview};
+use mrol_cluster::{Holders, NodeBeat, Overview, SeenMap};
 use mrol_service::replication::NodeName;
 
 const EXAMPLES: &str = "\
@@ -51,12 +51,28 @@ fn check_silent(seen: &Overview, node: &NodeName) -> Result<(), CliError> {
             let nodes = if nodes.is_empty() { "none".to_owned() } else { nodes.join(", ") };
             Err(CliError::failed(format!("node {node} is none of the cluster's, which are: {nodes}")))
         }
+        Some(_) if !only_at(seen, node).is_empty() => {
+            let maps = only_at(seen, node).join(", ");
+            Err(CliError::failed(format!(
+                "node {node} is the only one that holds {maps}: put them on others first (`mrol cluster copies MAP NODE`), or \
+                 delete them"
+            )))
+        }
         Some(seen) if seen.is_live => Err(CliError::failed(format!(
             "node {node} is live, at {}: a node is forgotten once it has ended for good",
             seen.beat.grpc
         ))),
         Some(_) => Ok(()),
     }
+}
+
+/// The maps that a node alone holds.
+fn only_at(seen: &Overview, node: &NodeName) -> Vec<String> {
+    let is_only = |map: &&SeenMap| match &map.holders {
+        Holders::All => false,
+        Holders::Only(nodes) => nodes.len() == 1 && nodes.contains(node),
+    };
+    seen.maps.iter().filter(is_only).map(|map| map.name.to_string()).collect()
 }
 
 #[derive(Serialize)]
@@ -73,6 +89,8 @@ impl Display for Forgotten {
 #[cfg(test)]
 mod tests {
     use mrol_cluster::{Beat, SeenNode};
+    use mrol_map::map::MapName;
+    use uuid::Uuid;
 
     use super::*;
 
@@ -88,12 +106,25 @@ mod tests {
                 ..Beat::default()
             },
         };
-        let seen = Overview { nodes: vec![seen("n1", true), seen("n2", false)], maps: Vec::new() };
+        let map = |name: &str, holders: &[&str]| SeenMap {
+            name: MapName::new(name).unwrap(),
+            uuid: Uuid::nil(),
+            wished: None,
+            holders: Holders::Only(holders.iter().map(|name| NodeName::new(name).unwrap()).collect()),
+            copies: Vec::new(),
+        };
+        let maps = vec![map("hall", &["n2", "n3"]), map("yard", &["n3"])];
+        let seen = Overview { nodes: vec![seen("n1", true), seen("n2", false), seen("n3", false)], maps };
         let refused = |name: &str| {
             check_silent(&seen, &NodeName::new(name).unwrap()).map_err(|error| error.to_string())
         };
         assert_eq!(refused("n2"), Ok(()));
         assert!(refused("n1").unwrap_err().contains("node n1 is live, at http://10.0.0.1:7334"));
-        assert_eq!(refused("n9").unwrap_err(), "node n9 is none of the cluster's, which are: n1, n2");
+        assert_eq!(refused("n9").unwrap_err(), "node n9 is none of the cluster's, which are: n1, n2, n3");
+        assert!(
+            refused("n3")
+                .unwrap_err()
+                .contains("node n3 is the only one that holds yard: put them on others")
+        );
     }
 }

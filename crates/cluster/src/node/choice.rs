@@ -51,8 +51,8 @@ pub(super) struct Known<'a> {
 }
 
 /// What a node does about the lead of a map. Whatever it chooses is safe: two nodes that claim at once are told apart
-/// by the log. It is made so that one claims as a rule, and soon. A node that is to hold the map no more claims
-/// nothing that it is not given, and leads until a holder can take over.
+/// by the log. It is made so that one claims as a rule, and soon. A node that is to hold the map no more leads
+/// until a holder can take over.
 pub(super) fn choose(known: &Known<'_>) -> Choice {
     match known.lead {
         Lead::Shared { is_here: true, .. } => match successor(known) {
@@ -67,14 +67,13 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
             None => Choice::Stay,
         },
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
-        // One that is to hold the map no more takes what it is given: it has what the holders have not.
-        Lead::Shared { leader, .. }
-            if !known.placement.holders.contains(known.own) && leader.as_ref() != Some(known.own) =>
+        Lead::Shared { leader, .. } if !may_claim(known, leader.as_ref()) => Choice::Stay,
+        // What it would write, not all could read: nodes are exchanged one by one.
+        Lead::Shared { .. }
+            if known.view.reads_least(known.map, &known.placement.holders) < known.record_version =>
         {
             Choice::Stay
         }
-        // What it would write, not all could read: nodes are exchanged one by one.
-        Lead::Shared { .. } if known.view.reads_least(known.map) < known.record_version => Choice::Stay,
         Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
         _ => Choice::Stay,
     }
@@ -85,7 +84,7 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
 fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     let Known { view, map, .. } = *known;
     let Placement { holders, leader: wished } = known.placement;
-    let read_by_all = view.reads_least(map).min(known.record_version);
+    let read_by_all = view.reads_least(map, holders).min(known.record_version);
     let may_lead = |node: &NodeName| {
         holders.contains(node) && view.writes(node) <= read_by_all && can_take_over(known, node)
     };
@@ -96,6 +95,15 @@ fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     };
     let first = able.max_by_key(rank).map(|(node, _)| node);
     first.filter(|node| !may_go_on || wished.as_ref() == Some(*node))
+}
+
+/// True of a holder. One that is to hold the map no more takes what it is given, since it has what the holders have not,
+/// and what no live holder has a copy of.
+fn may_claim(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
+    let holders = &known.placement.holders;
+    holders.contains(known.own)
+        || leader == Some(known.own)
+        || !known.view.holders(known.map).any(|(node, _)| holders.contains(node))
 }
 
 /// True where another node leads, or may be about to. One that the log names and that does not take over is not waited
@@ -386,7 +394,13 @@ mod tests {
         };
         let (led, followed) = (led_by(Some("b"), true), led_by(Some("b"), false));
         let gone = [("a", false, Some(5), false)];
-        assert_eq!(chosen(&["a", "c"], &led_by(Some("a"), false), &gone, None), Choice::Stay);
+        let there = [("a", false, Some(5), false), ("c", true, Some(4), false)];
+        assert_eq!(chosen(&["a", "c"], &led_by(Some("a"), false), &there, None), Choice::Stay);
+        assert_eq!(
+            chosen(&["a", "c"], &led_by(Some("a"), false), &gone, None),
+            Choice::Claim,
+            "no live holder has a copy"
+        );
         assert_eq!(
             chosen(&["a", "c"], &followed, &gone, None),
             Choice::Claim,

@@ -178,6 +178,19 @@ impl Entering {
         Err(ServiceError::map_elsewhere(name, live))
     }
 
+    /// The refusal of a map that this node is to hold and has no copy of yet: with the addresses of those that have one.
+    fn not_copied_yet(&self, name: &MapName, entry: &MapEntry) -> ServiceError {
+        let has_copy = |holder: &MapHolder| {
+            let view = self.view.borrow();
+            view.holders(entry.uuid).any(|(node, _)| node.as_str() == holder.node)
+        };
+        let with_copy: Vec<MapHolder> = self.live_holders(entry).into_iter().filter(has_copy).collect();
+        match with_copy.is_empty() {
+            true => try_again(&format!("this node has no copy of map {name} yet, and no other that is live")),
+            false => ServiceError::map_elsewhere(name, with_copy),
+        }
+    }
+
     async fn delete_map(&self, name: &MapName, uuid: Uuid) -> Result<(), ServiceError> {
         let (joined, of) = (self.joined()?, name.clone());
         let deleted = blocking(move || -> Result<(), ServiceError> {
@@ -206,7 +219,17 @@ impl SharedCatalog for Entering {
             let Some(entry) = self.listed(name).await? else { return Ok(false) };
             self.check_held_here(name, &entry)?;
             let waited = timeout(COPIED_WITHIN, self.wait(name, entry.uuid, true, COPIED_WITHIN)).await;
-            Ok(waited.is_ok_and(|waited| waited.is_ok()))
+            match waited {
+                Ok(Ok(())) => Ok(true),
+                // It was deleted meanwhile; or it is there, and this node is still loading it, or cannot.
+                _ => match self.listed(name).await? {
+                    None => Ok(false),
+                    Some(entry) => {
+                        self.check_held_here(name, &entry)?;
+                        Err(self.not_copied_yet(name, &entry))
+                    }
+                },
+            }
         })
     }
 

@@ -201,14 +201,15 @@ impl Node {
         let mut handed = Vec::new();
         for map in led(service) {
             let view = self.view.borrow().clone();
-            // One that is about to drop its copy does not lead.
             let wanted = self.list.borrow().holders_of(map.version.map_uuid);
-            let holders = view.holders(map.version.map_uuid).filter(|(node, _)| wanted.contains(node));
-            // Those of an older version read less than a newer one would write.
+            // Those of an older version read less than a newer one would write. One that is about to drop its copy
+            // leads where no holder has one.
             let version = |node: &NodeName| view.others[node].beat.record_version;
-            let first =
-                |(node, head): &(&NodeName, &MapHead)| (std::cmp::Reverse(version(node)), head.sequence);
-            let Some((node, _)) = holders.max_by_key(first) else { continue };
+            let first = |(node, head): &(&NodeName, &MapHead)| {
+                (wanted.contains(node), std::cmp::Reverse(version(node)), head.sequence)
+            };
+            let copies = view.holders(map.version.map_uuid);
+            let Some((node, _)) = copies.max_by_key(first) else { continue };
             let over = service.hand_map_over(&map.name, node.clone());
             match tokio::time::timeout(until.saturating_duration_since(Instant::now()), over).await {
                 Ok(Ok(_)) => handed.push(map.name),

@@ -8,6 +8,7 @@ use mrol_service::{NoRoom, Reason};
 use uuid::Uuid;
 
 use crate::beat::{Beat, MapHead};
+use crate::catalog::Holders;
 
 /// What a node sees of the others after a beat of its own was acknowledged.
 #[derive(Debug, Clone, Default)]
@@ -57,12 +58,15 @@ impl View {
         })
     }
 
-    /// The least version of records that the other live nodes read which follow a map, or are about to: one that has
-    /// parted from it reads none.
-    pub(super) fn reads_least(&self, map: Uuid) -> u32 {
-        let live = self.others.values().filter(|seen| seen.is_live);
-        let follow = live.filter(|seen| seen.beat.maps.get(&map).is_none_or(|head| !head.is_parted));
-        follow.map(|seen| seen.beat.record_version).min().unwrap_or(u32::MAX)
+    /// The least version of records that the other live nodes read which follow a map, or are about to as its
+    /// `holders`: one that has parted from it reads none.
+    pub(super) fn reads_least(&self, map: Uuid, holders: &Holders) -> u32 {
+        let live = self.others.iter().filter(|(_, seen)| seen.is_live);
+        let follow = live.filter(|(node, seen)| match seen.beat.maps.get(&map) {
+            Some(head) => !head.is_parted,
+            None => holders.contains(node),
+        });
+        follow.map(|(_, seen)| seen.beat.record_version).min().unwrap_or(u32::MAX)
     }
 
     /// Version of the records that another node writes.

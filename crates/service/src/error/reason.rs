@@ -200,7 +200,7 @@ reasons! {
         CatalogBusy "catalog_busy" Both: "a map has been made, replaced, renamed, deleted or opened for long: it is large, or its disk slow", "retry as told";
         Draining "draining" Both: "the server is going down", "retry elsewhere or later";
         HistoriesDiffer "histories_differ" Both: "several nodes share the map, and this one has another history of it, cannot tell whether it has, or is behind where the log begins; the message names the revision", "ask another node; decide which history stays";
-        MapElsewhere "map_elsewhere" Both 307: "other nodes of the cluster hold the map; the answer names their addresses", "ask one of them: HTTP clients follow `Location`";
+        MapElsewhere "map_elsewhere" Both 307: "other nodes of the cluster hold the map; the answer names their addresses", "ask one of them: HTTP clients follow `Location`, and send their key again";
         MapReadOnly "map_read_only" Both: "the map's journal failed; it answers queries and takes no changes", "mend the disk, restart the server";
         MapUnavailable "map_unavailable" Both: "the map could not be opened; the message names file and remedy", "`mrol doctor`, then restart";
         NoQuorum "no_quorum" Both: "several nodes share the map, and their log acknowledges nothing; nothing was changed", "retry as told";

@@ -5,6 +5,7 @@ where there is no TLS, and a server may be made to name any place; a stranger wo
 anything. Of the address that is named nothing but scheme, host and port counts: what is asked there is what was asked here.
 """
 
+import json
 from urllib.parse import urlsplit
 
 from ..errors import BadAnswer, excerpt
@@ -21,19 +22,29 @@ PORTS = {"http": 80, "https": 443}
 
 
 def target(answer: Answer, servers: Servers, hops: int) -> Pool:
-    """The server that an answer names, after so many that did.
+    """The server that an answer names, after so many that did: the first of those that it names which is known.
 
     Raises `BadAnswer` where it is none of `servers`, or there were too many.
     """
     location = answer.header("location") or ""
-    address = _address(location)
-    found = None if address is None else servers.of(address)
+    addresses = (_address(named) for named in [location, *_others(answer)])
+    known = (servers.of(address) for address in addresses if address is not None)
+    found = next((pool for pool in known if pool is not None), None)
     if found is None:
         wrong = f"{excerpt(location)}, which is none of this client's addresses: nothing was sent there"
         raise BadAnswer(f"the server sends the request on to {wrong}")
     if hops >= HOPS_MAX:
         raise BadAnswer(f"the request was sent on more than {HOPS_MAX} times, last to {found.address.shown}")
     return found
+
+
+def _others(answer: Answer) -> list[str]:
+    """The other servers that an answer names: those of its `elsewhere`."""
+    try:
+        named = json.loads(bytes(answer.body))["elsewhere"]
+        return [holder["http"] for holder in named if isinstance(holder["http"], str)]
+    except (ValueError, LookupError, TypeError, RecursionError):
+        return []
 
 
 def _address(location: str) -> "Address | None":
