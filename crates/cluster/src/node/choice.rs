@@ -97,8 +97,8 @@ fn successor<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
     first.filter(|node| !may_go_on || wished.as_ref() == Some(*node))
 }
 
-/// True of a holder. One that is to hold the map no more takes what it is given, since it has what the holders have not,
-/// and what no live holder has a copy of.
+/// True of a holder. One that is to hold the map no more takes what it is given, since it has what the holders have
+/// not, and what no live holder has a copy of.
 fn may_claim(known: &Known<'_>, leader: Option<&NodeName>) -> bool {
     let holders = &known.placement.holders;
     holders.contains(known.own)

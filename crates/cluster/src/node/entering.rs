@@ -178,7 +178,8 @@ impl Entering {
         Err(ServiceError::map_elsewhere(name, live))
     }
 
-    /// The refusal of a map that this node is to hold and has no copy of yet: with the addresses of those that have one.
+    /// The refusal of a map that this node is to hold and has no copy of yet: with the addresses of those that have
+    /// one.
     fn not_copied_yet(&self, name: &MapName, entry: &MapEntry) -> ServiceError {
         let has_copy = |holder: &MapHolder| {
             let view = self.view.borrow();
