@@ -19,6 +19,10 @@ pub struct Beat {
     /// The maps that it holds, by uuid.
     #[serde(default)]
     pub maps: BTreeMap<Uuid, MapHead>,
+    /// Copies that have not joined their logs since the node was started, with their revisions: it takes no changes of
+    /// them yet, and may have what a log has lost.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub unjoined: BTreeMap<Uuid, u64>,
     /// Bytes that its disk has left.
     pub free_bytes: u64,
     /// Why the node takes nothing that makes maps grow: `disk_full` or `memory_full`; none where it does.
@@ -74,6 +78,7 @@ mod tests {
             version: "0.2.0".to_owned(),
             record_version: 5,
             maps,
+            unjoined: BTreeMap::from([(Uuid::from_u128(8), 3)]),
             free_bytes: 1 << 40,
             no_room: None,
             has_ended: false,

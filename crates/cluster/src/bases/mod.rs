@@ -1,7 +1,7 @@
 //! Bases of maps: map files that stand for what is cut from the front of a log.
 //!
-//! Reading order: `base` is what is known of one; `error` is what may go wrong; `store` holds the files; `sweep`
-//! deletes what is left of uploads that were cut short; `pointers` says which file is a map's base.
+//! Reading order: `base` is what is known of one; `error` is what may go wrong; `store` holds the files; `pointers`
+//! says which file is a map's base; `sweep` deletes what nothing points to.
 
 mod base;
 mod error;

@@ -1,12 +1,15 @@
-//! What uploads that were cut short leave behind.
+//! What nothing points to any more.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+use uuid::Uuid;
 
+use super::base::object_of;
 use super::error::BaseError;
+use super::pointers::BasePointers;
 use super::store::{BaseStore, NAME};
 
 /// How long each question may take.
@@ -15,47 +18,62 @@ const WITHIN: Duration = Duration::from_secs(5);
 /// Files that are described at once: NATS gives no more. A map has two bases at most.
 const FILES_MAX: usize = 1_024;
 
-/// Pieces that belong to no file: subject, and how many.
+/// What nothing points to: a file that is no map's base, or was deleted, by the number of its description, and pieces
+/// that belong to no file, by how many there are. Each by its subject.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Orphans(BTreeMap<String, u64>);
 
 impl Orphans {
-    /// How many pieces there are.
-    pub fn pieces(&self) -> u64 {
-        self.0.values().sum()
+    /// True where there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }
 
+/// What NATS says of a file.
+struct Described {
+    subject: String,
+    /// Number of what it says.
+    sequence: u64,
+    name: String,
+    /// What the file's pieces are called; none of one that was deleted.
+    nuid: Option<String>,
+}
+
 impl BaseStore {
-    /// Deletes pieces that belong to no file now, did not `before`, and have not become more since: of uploads that
-    /// were cut short. Says what belongs to no file still. To be called minutes apart, with what the last call said.
+    /// Deletes what nothing points to now, nor did `before`, and is the same since: of nodes that went down while they
+    /// put a base. Says what nothing points to still; pieces of a file that is deleted now are among it. To be called
+    /// minutes apart, with what the last call said.
     ///
     /// # Errors
     /// Nobody answered, or a file that was just put is not described on all servers yet.
-    pub fn sweep(&self, before: &Orphans) -> Result<Orphans, BaseError> {
+    pub fn sweep(&self, pointers: &BasePointers, before: &Orphans) -> Result<Orphans, BaseError> {
         let engine = &self.engine;
-        engine.block_on(async {
-            let described = self.described().await?;
-            let (descriptions, pieces) = self.subjects().await?;
-            if descriptions != described.len() {
-                return Err(BaseError::Unavailable(format!("object store {NAME}: a server lags")));
-            }
-            let piece_of = |nuid: &String| format!("$O.{NAME}.C.{nuid}");
-            let whole: BTreeSet<_> = described.iter().flatten().map(piece_of).collect();
-            let mut orphans: BTreeMap<_, _> =
-                pieces.into_iter().filter(|(subject, _)| !whole.contains(subject)).collect();
-            let is_left = |(subject, count): &(&String, &u64)| before.0.get(*subject) == Some(*count);
-            let left: Vec<_> = orphans.iter().filter(is_left).map(|(subject, _)| subject.clone()).collect();
-            for subject in left {
-                self.purge(&subject).await?;
-                orphans.remove(&subject);
-            }
-            Ok(Orphans(orphans))
-        })
+        let described = engine.block_on(self.described())?;
+        // A file is put before it is pointed to.
+        let bases = bases_of(&described, pointers)?;
+        let (descriptions, pieces) = engine.block_on(self.subjects())?;
+        if descriptions != described.len() {
+            return Err(BaseError::Unavailable(format!("object store {NAME}: a server lags")));
+        }
+        let whole: BTreeSet<_> =
+            described.iter().filter_map(|file| file.nuid.as_ref()).map(pieces_of).collect();
+        let is_base = |file: &Described| file.nuid.is_some() && bases.contains(&file.name);
+        let files = described.iter().filter(|file| !is_base(file));
+        let files = files.map(|file| (file.subject.clone(), file.sequence));
+        let pieces = pieces.into_iter().filter(|(subject, _)| !whole.contains(subject));
+        let mut orphans: BTreeMap<_, _> = files.chain(pieces).collect();
+        let is_left = |(subject, count): &(&String, &u64)| before.0.get(*subject) == Some(*count);
+        let left: Vec<_> = orphans.iter().filter(is_left).map(|(subject, _)| subject.clone()).collect();
+        for subject in left {
+            engine.block_on(self.purge(&subject))?;
+            orphans.remove(&subject);
+        }
+        Ok(Orphans(orphans))
     }
 
-    /// The files as one server describes them: what their pieces are called, or nothing of one that was deleted.
-    async fn described(&self) -> Result<Vec<Option<String>>, BaseError> {
+    /// The files as one server describes them.
+    async fn described(&self) -> Result<Vec<Described>, BaseError> {
         #[derive(Serialize)]
         struct Question {
             multi_last: [String; 1],
@@ -63,17 +81,23 @@ impl BaseStore {
         }
         #[derive(Deserialize)]
         struct Description {
+            name: String,
             nuid: String,
             #[serde(default)]
             deleted: bool,
         }
         let question = Question { multi_last: [format!("$O.{NAME}.M.>")], batch: FILES_MAX };
         let found = self.engine.batch(&stream(), &question, WITHIN).await.map_err(unavailable)?;
-        let read = |payload: &[u8]| {
-            let description: Description = serde_json::from_slice(payload).map_err(unavailable)?;
-            Ok((!description.deleted).then_some(description.nuid))
+        let read = |message: crate::engine::BatchMessage| {
+            let Description { name, nuid, deleted } =
+                serde_json::from_slice(&message.payload).map_err(unavailable)?;
+            let subject = message.headers.get("Nats-Subject").map(|subject| subject.as_str().to_owned());
+            let subject = subject.ok_or_else(|| {
+                BaseError::Unavailable(format!("object store {NAME}: file {name} has no subject"))
+            })?;
+            Ok(Described { subject, sequence: message.sequence, name, nuid: (!deleted).then_some(nuid) })
         };
-        found.iter().map(|message| read(&message.payload)).collect()
+        found.into_iter().map(read).collect()
     }
 
     /// By the leader: how many files are described, and how many pieces of each name there are.
@@ -109,6 +133,21 @@ impl BaseStore {
         let purged = self.engine.call::<IgnoredAny>(&endpoint, &Question { filter: subject }, WITHIN).await;
         purged.map(|_| ()).map_err(unavailable)
     }
+}
+
+/// Names of the files that are the bases of the maps of which there is one.
+fn bases_of(described: &[Described], pointers: &BasePointers) -> Result<BTreeSet<String>, BaseError> {
+    let map_of = |file: &Described| Uuid::try_parse(file.name.split('/').next()?).ok();
+    let maps: BTreeSet<Uuid> = described.iter().filter_map(map_of).collect();
+    let mut bases = BTreeSet::new();
+    for map in maps {
+        bases.extend(pointers.read(map)?.map(|(base, _)| object_of(&base, map)));
+    }
+    Ok(bases)
+}
+
+fn pieces_of(nuid: &String) -> String {
+    format!("$O.{NAME}.C.{nuid}")
 }
 
 fn stream() -> String {

@@ -180,9 +180,11 @@ impl Heart {
     fn own_beat(&self) -> Beat {
         let NodeSettings { http, grpc, version, record_version, .. } = self.settings.clone();
         let free_bytes = self.service.measure().disk_free_bytes.unwrap_or(u64::MAX);
-        let maps = self.service.shared_maps().into_iter().filter_map(head_of).collect();
+        let copies = self.service.shared_maps();
+        let unjoined = unjoined(&copies, &self.list.borrow());
+        let maps = copies.into_iter().filter_map(head_of).collect();
         let no_room = self.service.shortages().first().map(|shortage| shortage.reason().as_str().to_owned());
-        Beat { http, grpc, version, record_version, maps, free_bytes, no_room, has_ended: false }
+        Beat { http, grpc, version, record_version, maps, unjoined, free_bytes, no_room, has_ended: false }
     }
 }
 
@@ -191,6 +193,15 @@ fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
     let is_parted = map.failure.is_some();
     let revision = map.version.revision;
     Some((map.version.map_uuid, MapHead { revision, epoch, claim, sequence, leads: is_here, is_parted }))
+}
+
+/// The copies that have not joined their logs, with their revisions. One that another took the place of is kept under
+/// another name than the list has for the map, and joins no log.
+fn unjoined(copies: &[SharedMap], list: &Listing) -> BTreeMap<Uuid, u64> {
+    let name_of = |uuid: Uuid| list.maps().find(|(_, entry)| entry.uuid == uuid).map(|(name, _)| name);
+    let unjoined = copies.iter().filter(|copy| copy.lead == Lead::NotJoined);
+    let listed = unjoined.filter(|copy| name_of(copy.version.map_uuid).is_none_or(|name| name == copy.name));
+    listed.map(|copy| (copy.version.map_uuid, copy.version.revision)).collect()
 }
 
 /// True where a copy is behind where another node was then, or is not there, of a map that is not held `elsewhere`.

@@ -27,6 +27,7 @@ use crate::store::ClusterStore;
 
 /// Pause before a copy is tried again.
 const PAUSE: Duration = Duration::from_secs(1);
+
 /// Keeps this node's copy of one map: takes it in where it has none, shares it by its log, and leads it where it is to.
 /// Where the node is to hold the map no more, drops the copy once others have what it has.
 pub(super) struct Keeper {
@@ -292,7 +293,6 @@ enum Ended {
     Behind,
 }
 
-/// Waits until there was a claim, or this node has taken over or lost the lead.
 /// How far a copy is, at `revision`; none before it has joined its log, where that says nothing.
 fn progress_of(lead: &Lead, revision: u64) -> Option<Progress> {
     match lead {

@@ -17,7 +17,9 @@ use super::blocking::blocking;
 use super::heart::Pulse;
 use super::keeper::Keeper;
 use super::settings::{BaseLimits, NodeSettings};
+use super::sweeping::Sweeping;
 use super::view::View;
+use crate::beat::Beat;
 use crate::catalog::{Listing, Placement};
 use crate::store::ClusterStore;
 
@@ -59,6 +61,7 @@ pub(super) struct Keepers {
     revision: u64,
     /// Maps that were deleted, since when this node knows.
     deleted: BTreeMap<Uuid, Instant>,
+    sweeping: Sweeping,
 }
 
 struct Kept {
@@ -86,6 +89,7 @@ impl Keepers {
         let NodeSettings { name: node, record_version, bases, .. } = settings.clone();
         let (kept, deleted) = (BTreeMap::new(), BTreeMap::new());
         let revision = 0;
+        let sweeping = Sweeping::of(joined.clone(), bases.swept_every);
         Self {
             node,
             record_version,
@@ -99,6 +103,7 @@ impl Keepers {
             kept,
             revision,
             deleted,
+            sweeping,
         }
     }
 
@@ -125,7 +130,7 @@ impl Keepers {
                     }
                     None => return,
                 },
-                _ = view.changed() => self.forget_deleted().await,
+                _ = view.changed() => self.tidy().await,
                 () = hints.next() => looks = LOOKS_MAX,
             }
         }
@@ -221,15 +226,24 @@ impl Keepers {
         }
     }
 
-    /// Takes away what is left at NATS of maps that were deleted, and forgets those that no node has a copy of.
-    async fn forget_deleted(&mut self) {
+    /// Takes away what is left at NATS. One of the nodes is enough, once all are there: a node that is gone may come back
+    /// with what its last beat did not have yet.
+    async fn tidy(&mut self) {
         let view = self.view.borrow().clone();
-        let is_held = |uuid: &Uuid| view.others.values().any(|seen| seen.beat.maps.contains_key(uuid));
-        // A node that is gone may come back with a copy that its last beat did not have yet. One of the nodes is
-        // enough.
-        let is_first = view.others.iter().all(|(node, seen)| seen.is_live && *node > self.node);
+        if view.others.iter().all(|(node, seen)| seen.is_live && *node > self.node) {
+            self.forget_deleted(&view).await;
+            self.sweeping.look().await;
+        }
+    }
+
+    /// Takes away what is left at NATS of maps that were deleted, and forgets those that no node has a copy of.
+    async fn forget_deleted(&mut self, view: &View) {
+        let has = |Beat { maps, unjoined, .. }: &Beat, uuid: &Uuid| {
+            maps.contains_key(uuid) || unjoined.contains_key(uuid)
+        };
+        let is_held = |uuid: &Uuid| view.others.values().any(|seen| has(&seen.beat, uuid));
         let due = |(uuid, since): (&Uuid, &Instant)| {
-            (is_first && since.elapsed() > DELETED_FOR && !is_held(uuid)).then_some(*uuid)
+            (since.elapsed() > DELETED_FOR && !is_held(uuid)).then_some(*uuid)
         };
         let due: BTreeSet<Uuid> = self.deleted.iter().filter_map(due).collect();
         if due.is_empty() {

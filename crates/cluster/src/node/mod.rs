@@ -8,7 +8,7 @@
 //! 3. `blocking`: questions to NATS, which block.
 //! 4. `lag`: whether it is where the others are.
 //! 5. `heart`: beats every two seconds, and sees who is gone.
-//! 6. `cutting`: puts a base and cuts the front of a log off.
+//! 6. `cutting`, `sweeping`: puts a base and cuts the front of a log off; deletes what nothing points to.
 //! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads
 //!    it where it is to.
 //! 8. `keepers`: one for each map of the cluster's list that this node holds.
@@ -28,6 +28,7 @@ mod release;
 mod room;
 mod server;
 mod settings;
+mod sweeping;
 mod view;
 
 pub use server::{Node, NodeStatus};

@@ -36,10 +36,18 @@ pub struct BaseLimits {
     pub messages_max: u64,
     /// How often it is looked.
     pub looked_every: Duration,
+    /// How often it is looked for what nothing points to; what was there at two looks is deleted. Longer than putting a
+    /// base may take.
+    pub swept_every: Duration,
 }
 
 impl Default for BaseLimits {
     fn default() -> Self {
-        Self { bytes_max: 256 << 20, messages_max: 100_000, looked_every: Duration::from_secs(30) }
+        Self {
+            bytes_max: 256 << 20,
+            messages_max: 100_000,
+            looked_every: Duration::from_secs(30),
+            swept_every: Duration::from_secs(3600),
+        }
     }
 }

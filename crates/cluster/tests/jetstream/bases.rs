@@ -81,11 +81,34 @@ fn a_file_whose_upload_was_cut_short_is_not_there_and_is_put_again() {
     assert!(matches!(cut, Err(BaseError::Unavailable(_))), "{cut:?}");
     servers.start_all();
     assert!(!eventually(|| store.has(map, &base)));
-    let orphans = store.sweep(&Orphans::default()).unwrap();
-    assert!(orphans.pieces() > 0, "nothing was put before the servers were killed");
+    let pointers = BasePointers::create(&engine).unwrap();
+    let sweep = |before: &Orphans| store.sweep(&pointers, before).unwrap();
+    let orphans = sweep(&Orphans::default());
+    assert!(!orphans.is_empty(), "nothing was put before the servers were killed");
     assert!(matches!(store.fetch(map, &base), Err(BaseError::Unavailable(_))));
     eventually(|| store.put(map, &base, &file));
-    assert_eq!(store.sweep(&Orphans::default()).unwrap(), orphans, "what was put is no orphan");
-    assert_eq!(store.sweep(&orphans).unwrap(), Orphans::default());
+    pointers.change(map, &base, 0).unwrap();
+    assert_eq!(sweep(&Orphans::default()), orphans, "what was put is no orphan");
+    assert_eq!(sweep(&orphans), Orphans::default());
+    assert!(store.fetch(map, &base).unwrap() == file, "another file");
+
+    // One that nothing points to goes, and then its pieces; unless it was put again meanwhile.
+    let unused = base_at(Position { sequence: 4, id: Some(Uuid::new_v4()) });
+    store.put(map, &unused, &file).unwrap();
+    let found = sweep(&Orphans::default());
+    store.put(map, &unused, &file).unwrap();
+    let again = sweep(&found);
+    assert_ne!(again, found);
+    assert!(store.has(map, &unused).unwrap(), "it is another by now");
+    let pieces = sweep(&again);
+    assert!(!store.has(map, &unused).unwrap());
+    assert!(!pieces.is_empty());
+    assert_eq!(sweep(&pieces), Orphans::default());
+    // So does the description of one that was deleted.
+    store.put(map, &unused, &file).unwrap();
+    store.delete(map, &unused).unwrap();
+    let deleted = sweep(&Orphans::default());
+    assert!(!deleted.is_empty());
+    assert_eq!(sweep(&deleted), Orphans::default());
     assert!(store.fetch(map, &base).unwrap() == file, "another file");
 }

@@ -18,6 +18,7 @@ fn beat(revision: u64) -> Beat {
             Uuid::from_u128(1),
             MapHead { revision, epoch: 2, claim: None, sequence: revision, leads: false, is_parted: false },
         )]),
+        unjoined: BTreeMap::new(),
         free_bytes: 1 << 30,
         no_room: None,
         has_ended: false,

@@ -13,8 +13,12 @@ use crate::nodes::{Server, leader, name, retried, waited};
 use crate::support::{NatsServers, eventually};
 
 /// A base is due after so few messages.
-const SMALL: BaseLimits =
-    BaseLimits { bytes_max: u64::MAX, messages_max: 20, looked_every: Duration::from_millis(1) };
+const SMALL: BaseLimits = BaseLimits {
+    bytes_max: u64::MAX,
+    messages_max: 20,
+    looked_every: Duration::from_millis(1),
+    swept_every: Duration::from_secs(2),
+};
 
 /// What NATS has of a map.
 struct Kept {
@@ -153,4 +157,9 @@ fn a_base_that_was_put_in_part_keeps_no_node_from_going_on() {
     assert!(kept.base().revision > 30);
     let b = start("b", 1, SMALL);
     waited("equal copies", || b.version("hall") == a.version("hall"));
+    // A file that nothing points to does not stay.
+    let lost = Base { revision: 7, ..Base::default() };
+    kept.store.bases.put(map, &lost, &file).unwrap();
+    waited("it is swept", || !eventually(|| kept.store.bases.has(map, &lost)));
+    assert!(kept.store.bases.has(map, &kept.base()).unwrap(), "the base stays");
 }
