@@ -56,18 +56,19 @@ impl BaseStore {
         if descriptions != described.len() {
             return Err(BaseError::Unavailable(format!("object store {NAME}: a server lags")));
         }
-        let whole: BTreeSet<_> =
-            described.iter().filter_map(|file| file.nuid.as_ref()).map(pieces_of).collect();
         let is_base = |file: &Described| file.nuid.is_some() && bases.contains(&file.name);
+        let is_left = |subject: &str, number: u64| before.0.get(subject) == Some(&number);
+        let is_gone = |file: &Described| !is_base(file) && is_left(&file.subject, file.sequence);
+        // The description goes before the pieces, so that no file is described that is not whole.
+        let whole = described.iter().filter(|file| !is_gone(file)).filter_map(|file| file.nuid.as_ref());
+        let whole: BTreeSet<_> = whole.map(pieces_of).collect();
         let files = described.iter().filter(|file| !is_base(file));
         let files = files.map(|file| (file.subject.clone(), file.sequence));
         let pieces = pieces.into_iter().filter(|(subject, _)| !whole.contains(subject));
-        let mut orphans: BTreeMap<_, _> = files.chain(pieces).collect();
-        let is_left = |(subject, count): &(&String, &u64)| before.0.get(*subject) == Some(*count);
-        let left: Vec<_> = orphans.iter().filter(is_left).map(|(subject, _)| subject.clone()).collect();
-        for subject in left {
-            engine.block_on(self.purge(&subject))?;
-            orphans.remove(&subject);
+        let (left, orphans): (BTreeMap<_, _>, _) =
+            files.chain(pieces).partition(|(subject, number)| is_left(subject, *number));
+        for subject in left.keys() {
+            engine.block_on(self.purge(subject))?;
         }
         Ok(Orphans(orphans))
     }

@@ -226,13 +226,16 @@ impl Keepers {
         }
     }
 
-    /// Takes away what is left at NATS. One of the nodes is enough, once all are there: a node that is gone may come back
-    /// with what its last beat did not have yet.
+    /// Takes away what is left at NATS. One of the nodes is enough.
     async fn tidy(&mut self) {
         let view = self.view.borrow().clone();
-        if view.others.iter().all(|(node, seen)| seen.is_live && *node > self.node) {
+        if view.others.iter().any(|(node, seen)| seen.is_live && *node < self.node) {
+            return;
+        }
+        self.sweeping.look().await;
+        // One that is gone may come back with a copy that its last beat did not have yet.
+        if view.others.values().all(|seen| seen.is_live) {
             self.forget_deleted(&view).await;
-            self.sweeping.look().await;
         }
     }
 
