@@ -120,6 +120,7 @@ mod tests {
             epoch: 4,
             claim: None,
             sequence: 12,
+            agrees: true,
         };
         let followed = Lead::Shared {
             leader: NodeName::new("n2").ok(),
@@ -128,6 +129,7 @@ mod tests {
             epoch: 2,
             claim: None,
             sequence: 7,
+            agrees: true,
         };
         let maps = [
             shared("hall", 1, 12, led),

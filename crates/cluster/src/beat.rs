@@ -53,6 +53,13 @@ pub struct MapHead {
     /// failed.
     #[serde(default)]
     pub is_parted: bool,
+    /// False where the node cannot tell whether its history is the log's: it goes on from nothing that it has.
+    #[serde(default = "yes")]
+    pub agrees: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 #[cfg(test)]
@@ -70,6 +77,7 @@ mod tests {
                 sequence: 14,
                 leads: true,
                 is_parted: false,
+                agrees: true,
             },
         )]);
         let beat = Beat {

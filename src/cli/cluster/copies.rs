@@ -150,7 +150,15 @@ mod tests {
         let name = |name: &str| NodeName::new(name).unwrap();
         let beat = Beat::default();
         let copy = |&(node, is_live, has_copy, is_parted): &(&str, bool, bool, bool)| {
-            let head = MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads: false, is_parted };
+            let head = MapHead {
+                revision: 1,
+                epoch: 1,
+                claim: None,
+                sequence: 1,
+                leads: false,
+                is_parted,
+                agrees: true,
+            };
             has_copy.then(|| MapCopy { node: name(node), is_live, head })
         };
         let copies = nodes.iter().filter_map(copy).collect();

@@ -163,7 +163,15 @@ mod tests {
         let beat = Beat::default();
         let node = |name: &str| NodeName::new(name).unwrap();
         let copy = |&(name, is_live, revision, leads, is_parted): &(&str, bool, Option<u64>, bool, bool)| {
-            let head = MapHead { revision: revision?, epoch: 1, claim: None, sequence: 0, leads, is_parted };
+            let head = MapHead {
+                revision: revision?,
+                epoch: 1,
+                claim: None,
+                sequence: 0,
+                leads,
+                is_parted,
+                agrees: true,
+            };
             Some(MapCopy { node: node(name), is_live, head })
         };
         let copies = nodes.iter().filter_map(copy).collect();

@@ -76,6 +76,8 @@ struct CopyRow {
     /// Revisions behind the furthest copy.
     lag: u64,
     parted: bool,
+    /// Its node cannot tell whether it has the history of the log.
+    unsure: bool,
 }
 
 impl Report {
@@ -111,7 +113,15 @@ impl Report {
                      makes one copy the map"
                 )
             });
-            unled.into_iter().chain(parted)
+            let unsure = map.copies.iter().filter(|copy| copy.unsure).map(move |copy| {
+                let node = &copy.node;
+                format!(
+                    "map {name}: node {node} CANNOT TELL whether its copy has the history of the map's log. The next change \
+                     tells; while the copy is the furthest, none comes, and `mrol cluster keep NODE {name}` makes one copy \
+                     the map"
+                )
+            });
+            unled.into_iter().chain(parted).chain(unsure)
         });
         none.into_iter().chain(silent).chain(full).chain(maps).collect()
     }
@@ -151,6 +161,7 @@ impl MapRow {
             revision: copy.head.revision,
             lag: map.lag(copy),
             parted: copy.head.is_parted,
+            unsure: !copy.head.agrees && !copy.head.is_parted,
         };
         Self {
             map: map.name.to_string(),
@@ -186,6 +197,7 @@ impl Display for CopyRow {
             write!(f, " ({} behind)", self.lag)?;
         }
         f.write_str(if self.parted { " PARTED" } else { "" })?;
+        f.write_str(if self.unsure { " UNSURE" } else { "" })?;
         f.write_str(if self.live { "" } else { " silent" })
     }
 }
@@ -211,7 +223,7 @@ mod tests {
     use super::*;
 
     fn copy(node: &str, revision: u64, lag: u64) -> CopyRow {
-        CopyRow { node: node.into(), live: true, revision, lag, parted: false }
+        CopyRow { node: node.into(), live: true, revision, lag, parted: false, unsure: false }
     }
 
     #[test]
@@ -242,7 +254,7 @@ mod tests {
             nodes: vec![node("a", true), node("b", false), node("d", false)],
             maps: vec![
                 map("hall", Some("a"), vec![copy("a", 20, 0), copy("b", 18, 2), parted]),
-                map("yard", None, Vec::new()),
+                map("yard", None, vec![CopyRow { unsure: true, ..copy("a", 7, 0) }]),
             ],
         };
         let text = report.to_string();
@@ -251,11 +263,12 @@ mod tests {
             "b     SILENT",
             "d     ended",
             "hall  a       any     all      3      20        a 20, b 18 (2 behind), c 25 PARTED silent  u",
-            "yard  NONE    any     all      3      20        no copies",
+            "yard  NONE    any     all      3      20        a 7 UNSURE",
             "node b is SILENT: no beat within 3 s",
             "node a has NO ROOM (disk_full)",
             "NO NODE LEADS map yard",
             "map hall: the copy of node c has PARTED",
+            "map yard: node a CANNOT TELL",
         ] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }

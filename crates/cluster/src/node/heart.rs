@@ -189,10 +189,13 @@ impl Heart {
 }
 
 fn head_of(map: SharedMap) -> Option<(Uuid, MapHead)> {
-    let Lead::Shared { is_here, epoch, claim, sequence, .. } = map.lead else { return None };
+    let Lead::Shared { is_here, epoch, claim, sequence, agrees, .. } = map.lead else { return None };
     let is_parted = map.failure.is_some();
     let revision = map.version.revision;
-    Some((map.version.map_uuid, MapHead { revision, epoch, claim, sequence, leads: is_here, is_parted }))
+    Some((
+        map.version.map_uuid,
+        MapHead { revision, epoch, claim, sequence, leads: is_here, is_parted, agrees },
+    ))
 }
 
 /// The copies that have not joined their logs, with their revisions. One that another took the place of is kept under
@@ -206,8 +209,9 @@ fn unjoined(copies: &[SharedMap], list: &Listing) -> BTreeMap<Uuid, u64> {
 
 /// True where a copy is behind where another node was then, or is not there, of a map that is not held `elsewhere`.
 fn is_behind(own: &Beat, then: &View, elsewhere: &BTreeSet<Uuid>) -> bool {
-    let is_reached =
-        |map: &Uuid, revision: u64| own.maps.get(map).is_some_and(|own| own.revision >= revision);
+    let is_reached = |map: &Uuid, revision: u64| {
+        own.maps.get(map).is_some_and(|own| own.agrees && own.revision >= revision)
+    };
     let furthest = then.furthest();
     let mut held = furthest.iter().filter(|(map, _)| !elsewhere.contains(map));
     held.any(|(map, revision)| !is_reached(map, *revision))

@@ -76,7 +76,15 @@ mod tests {
             let head = |revision| {
                 (
                     MAP,
-                    MapHead { revision, epoch: 1, claim: None, sequence: revision, leads: false, is_parted },
+                    MapHead {
+                        revision,
+                        epoch: 1,
+                        claim: None,
+                        sequence: revision,
+                        leads: false,
+                        is_parted,
+                        agrees: true,
+                    },
                 )
             };
             let beat =

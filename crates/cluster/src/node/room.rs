@@ -31,8 +31,15 @@ mod tests {
     /// What `own` holds a new map with, beside the others: name, whether it is live, bytes that are free, maps.
     fn chosen(copies: usize, others: &[(&str, bool, u64, usize)]) -> String {
         let name = |name: &str| NodeName::new(name).unwrap();
-        let head =
-            MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads: false, is_parted: false };
+        let head = MapHead {
+            revision: 1,
+            epoch: 1,
+            claim: None,
+            sequence: 1,
+            leads: false,
+            is_parted: false,
+            agrees: true,
+        };
         let seen = |&(node, is_live, free_bytes, maps): &(&str, bool, u64, usize)| {
             let beat = Beat {
                 record_version: 1,

@@ -74,10 +74,10 @@ impl View {
         self.others.get(node).map_or(u32::MAX, |seen| seen.beat.record_version)
     }
 
-    /// The furthest revision of each map at the others that are live and take changes of it.
+    /// The furthest revision of each map at the others that are live, take changes of it and know that they agree.
     pub(super) fn furthest(&self) -> BTreeMap<Uuid, u64> {
         let live = self.others.values().filter(|seen| seen.is_live);
-        let heads = live.flat_map(|seen| &seen.beat.maps).filter(|(_, head)| !head.is_parted);
+        let heads = live.flat_map(|seen| &seen.beat.maps).filter(|(_, head)| !head.is_parted && head.agrees);
         let mut furthest = BTreeMap::new();
         for (map, head) in heads {
             let revision = furthest.entry(*map).or_insert(head.revision);

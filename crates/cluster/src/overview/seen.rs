@@ -109,7 +109,15 @@ mod tests {
     use super::*;
 
     fn copy(node: &str, revision: u64, epoch: u64, leads: bool, is_live: bool) -> MapCopy {
-        let head = MapHead { revision, epoch, claim: None, sequence: revision, leads, is_parted: false };
+        let head = MapHead {
+            revision,
+            epoch,
+            claim: None,
+            sequence: revision,
+            leads,
+            is_parted: false,
+            agrees: true,
+        };
         MapCopy { node: NodeName::new(node).unwrap(), is_live, head }
     }
 

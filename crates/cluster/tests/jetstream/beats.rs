@@ -16,7 +16,15 @@ fn beat(revision: u64) -> Beat {
         record_version: 1,
         maps: BTreeMap::from([(
             Uuid::from_u128(1),
-            MapHead { revision, epoch: 2, claim: None, sequence: revision, leads: false, is_parted: false },
+            MapHead {
+                revision,
+                epoch: 2,
+                claim: None,
+                sequence: revision,
+                leads: false,
+                is_parted: false,
+                agrees: true,
+            },
         )]),
         unjoined: BTreeMap::new(),
         free_bytes: 1 << 30,

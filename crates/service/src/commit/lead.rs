@@ -27,6 +27,8 @@ pub enum Lead {
         claim: Option<Uuid>,
         /// Number of the last message of the log that was read.
         sequence: u64,
+        /// False where this node cannot tell whether its history is the log's: it takes over from nobody.
+        agrees: bool,
     },
 }
 
@@ -39,6 +41,7 @@ impl Lead {
             epoch: member.epoch(),
             claim: member.last_claim(),
             sequence: member.position().sequence,
+            agrees: member.agrees(),
         }
     }
 }

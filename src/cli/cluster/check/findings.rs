@@ -211,6 +211,12 @@ fn problems_of(map: &SeenMap, seen: &Overview) -> Vec<Finding> {
             "{name}: the copy of node {node} has parted from the log: `mrol cluster keep NODE {name}` makes one copy the map"
         ));
     }
+    for copy in map.copies.iter().filter(|copy| copy.is_live && !copy.head.is_parted && !copy.head.agrees) {
+        problems.push(format!(
+            "{name}: node {} cannot tell whether its copy has the history of the log: the next change tells",
+            copy.node
+        ));
+    }
     let holders = seen.nodes.iter().filter(|node| node.is_live && map.holders.contains(&node.node));
     for node in holders.filter(|node| map.copy(&node.node).is_none()) {
         problems
@@ -230,7 +236,15 @@ mod tests {
     use super::*;
 
     fn node(name: &str, record_version: u32, free_bytes: u64, leads: bool) -> SeenNode {
-        let head = MapHead { revision: 1, epoch: 1, claim: None, sequence: 1, leads, is_parted: false };
+        let head = MapHead {
+            revision: 1,
+            epoch: 1,
+            claim: None,
+            sequence: 1,
+            leads,
+            is_parted: false,
+            agrees: true,
+        };
         let beat = Beat {
             version: "0.2.0".to_owned(),
             record_version,

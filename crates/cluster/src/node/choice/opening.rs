@@ -6,9 +6,10 @@ use uuid::Uuid;
 use super::Known;
 use crate::beat::MapHead;
 
-/// The live node that is furthest, where that is further than this one.
+/// The live node that is furthest and could take over, where that is further than this one.
 pub(super) fn furthest<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
-    let further = known.view.holders(known.map).filter(|(_, head)| head.revision > known.revision);
+    let further =
+        known.view.holders(known.map).filter(|(_, head)| head.agrees && head.revision > known.revision);
     further.max_by_key(|(_, head)| head.revision).map(|(node, _)| node)
 }
 

@@ -25,6 +25,7 @@ fn view(others: &[(&str, bool, Option<u64>, bool)]) -> View {
                 sequence: revision,
                 leads: !is_parted,
                 is_parted,
+                agrees: true,
             };
             (MAP, head)
         };
@@ -44,6 +45,7 @@ fn led_by(leader: Option<&str>, is_here: bool) -> Lead {
         epoch: 1,
         claim: None,
         sequence: 5,
+        agrees: true,
     }
 }
 
@@ -181,6 +183,7 @@ fn what_was_claimed_is_opened_once_all_have_said_how_far_they_are_since() {
         epoch: 1,
         claim: Some(Uuid::from_u128(claim)),
         sequence: 5,
+        agrees: true,
     };
     let then = |claim, claimed_at, others: &[(&str, bool, Option<u64>, bool)]| {
         let (lead, view) = (lead(claim), view(others));
@@ -234,6 +237,7 @@ fn a_copy_that_has_not_joined_its_log_and_is_further_is_waited_for() {
             epoch: 1,
             claim: Some(Uuid::from_u128(1)),
             sequence: 5,
+            agrees: true,
         };
         let mut others = view(&[("a", true, None, false)]);
         others.others.get_mut(&node("a")).unwrap().beat.unjoined.insert(MAP, unjoined);
