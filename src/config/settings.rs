@@ -208,7 +208,7 @@ impl Config {
             // A map that nodes share follows its log.
             sleep_after: self.maps.sleep_after().filter(|_| !self.cluster.is_used()),
             cluster: None,
-            may_be_adopted: false,
+            adoption: None,
         }
     }
 

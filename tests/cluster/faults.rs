@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -180,8 +181,10 @@ fn node_disk_full(site: &mut Site, load: &Load, node: usize) {
 fn nats_disk_full(site: &mut Site, load: &Load, server: usize) {
     site.nats.kill(server);
     let store = site.nats.store(server);
+    // It has to take what the others have.
+    let megabytes = 64 + 2 * (bytes_in(&store) >> 20) as u32;
     fs::remove_dir_all(&store).unwrap();
-    let Some(disk) = SmallDisk::over(&store, 64) else {
+    let Some(disk) = SmallDisk::over(&store, megabytes) else {
         skipped("a full disk of a server of NATS (mounting takes root)");
         site.nats.start_one(server);
         return nats_settled(site);
@@ -195,6 +198,16 @@ fn nats_disk_full(site: &mut Site, load: &Load, server: usize) {
     drop(disk);
     site.nats.start_one(server);
     nats_settled(site);
+}
+
+/// Bytes of the files of a folder, however deep.
+fn bytes_in(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    let bytes = entries.map(|entry| match entry.metadata().unwrap() {
+        of_folder if of_folder.is_dir() => bytes_in(&entry.path()),
+        of_file => of_file.len(),
+    });
+    bytes.sum()
 }
 
 /// How long writers were not acknowledged, by what happened.

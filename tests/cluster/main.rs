@@ -16,6 +16,7 @@ mod figures;
 mod large;
 mod link;
 mod load;
+mod lost_nats;
 #[expect(dead_code, reason = "the tests of the log use more of it")]
 mod nats;
 mod released;

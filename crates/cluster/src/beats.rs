@@ -41,11 +41,23 @@ impl Beats {
     /// # Errors
     /// Nobody acknowledged it in time.
     pub fn put(&self, node: &NodeName, beat: &Beat) -> Result<u64, BucketError> {
+        self.put_where(node, beat, None)
+    }
+
+    /// The same, if the last of that node is the one of this revision.
+    ///
+    /// # Errors
+    /// [`BucketError::Changed`] where it is another, or nobody acknowledged it in time.
+    pub fn put_after(&self, node: &NodeName, beat: &Beat, last: u64) -> Result<u64, BucketError> {
+        self.put_where(node, beat, Some(last))
+    }
+
+    fn put_where(&self, node: &NodeName, beat: &Beat, last: Option<u64>) -> Result<u64, BucketError> {
         let value = serde_json::to_vec(beat).map_err(|error| BucketError::Unavailable {
             bucket: "mrol-beats".to_owned(),
             cause: error.to_string(),
         })?;
-        self.0.put(node.as_str(), value.into(), None)
+        self.0.put(node.as_str(), value.into(), last)
     }
 
     /// Reads the last beats of all nodes, from one of the servers. What is none is told to the log and left out.

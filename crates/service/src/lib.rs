@@ -69,6 +69,6 @@ pub use scan::{
     TIME_LIMIT_DEFAULT, TrajectoryPieces,
 };
 pub use setting::{OutOfRange, Setting, SettingKind, SettingValue, Unit};
-pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
+pub use settings::{Adoption, EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use watch::Watch;
 pub use work::{Asker, LaneUse};

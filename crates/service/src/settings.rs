@@ -54,9 +54,17 @@ pub struct ServiceSettings {
     pub sleep_after: Option<Duration>,
     /// The other nodes of the cluster that this server is a node of; none of a server by itself.
     pub cluster: Option<Cluster>,
-    /// True to open a folder as well of which a cluster has adopted maps, and which no node has opened since: to adopt
-    /// more.
-    pub may_be_adopted: bool,
+    /// What the folder is opened for, where no server or node is to serve it.
+    pub adoption: Option<Adoption>,
+}
+
+/// Whose data folder is opened for a cluster to adopt its maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Adoption {
+    /// That of a server by itself; or one of which a cluster has adopted maps before, and which no node has opened since.
+    OfServer,
+    /// That of a node too, whose cluster lost what NATS had of it.
+    OfNode,
 }
 
 /// Settings of a robot, where its requests do not say.

@@ -13,18 +13,23 @@ use mrol::console::parse;
 use mrol::console::{CliError, Output, bytes};
 use mrol_cluster::{ClusterStore, Holders, Listing, NoStore, StreamError};
 use mrol_map::map::MapName;
-use mrol_service::{MapService, MapVersion, NewMap, ServiceError, ServiceSettings};
+use mrol_service::{Adoption, MapService, MapVersion, NewMap, ServiceError, ServiceSettings};
 use mrol_store::OpeningProgress;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol cluster adopt ./mrol-data --nats nats://10.0.0.1:4222,nats://10.0.0.2:4222
   mrol cluster adopt ./mrol-data --map office --map yard --config mrol.toml    these maps only
+  mrol cluster adopt ./mrol-data --of-node --config mrol.toml                  NATS was lost with its disks, and is new
 
 No server may use the folder meanwhile. Each map keeps its uuid and its revisions. All nodes hold the maps then, whatever
 cluster.copies says: `mrol cluster copies` changes that. A map whose name another map of the cluster has is refused, and nothing
 is done then. Done again, it goes on where it was ended. From then on the folder is for a node alone: a server by itself does not
-open it, unless it is started with --leave-cluster.";
+open it, unless it is started with --leave-cluster.
+
+Where NATS was lost with all its disks, the nodes have the maps: end all nodes, call this with --of-node for the folder of each, one after
+the other, and then start them with their folders. Of each map the copy that is furthest counts, whichever folder comes first. Leave
+the folder of a node out that said `histories_differ`.";
 
 /// Take the maps of a data folder into the cluster, while no server uses the folder
 #[derive(Debug, clap::Args)]
@@ -33,6 +38,9 @@ pub(super) struct Adopt {
     /// The data folder of a server by itself
     #[arg(value_name = "DATA_DIR")]
     data_dir: PathBuf,
+    /// The folder is a node's, of a cluster whose NATS was lost
+    #[arg(long)]
+    of_node: bool,
     /// Only this map; may be repeated
     #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
     maps: Vec<MapName>,
@@ -42,18 +50,26 @@ pub(super) struct Adopt {
 
 impl Adopt {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { data_dir, maps, nats } = self;
+        let Self { data_dir, of_node, maps, nats } = self;
         let settings = nats.settings()?;
         if !data_dir.join("maps").is_dir() {
             let folder = data_dir.display();
             return Err(CliError::usage(format!("{folder} is no data folder: it has no folder maps")));
         }
-        let data = Some(data_dir.clone());
-        let of_service =
-            ServiceSettings { data_dir: data, may_be_adopted: true, ..settings.service_settings() };
+        let of_service = ServiceSettings {
+            data_dir: Some(data_dir.clone()),
+            adoption: Some(if of_node { Adoption::OfNode } else { Adoption::OfServer }),
+            ..settings.service_settings()
+        };
         let service = MapService::open(of_service, &OpeningProgress::default()).map_err(CliError::failed)?;
         let runtime = Runtime::new().map_err(CliError::failed)?;
-        let maps = chosen(&service, &maps)?.into_iter().map(|name| {
+        let (chosen, former) = chosen(&service, &maps, of_node)?;
+        for name in former {
+            output.say(format!(
+                "map {name} is left out: it is a former copy of a map (--map {name} takes it as well)"
+            ))?;
+        }
+        let maps = chosen.into_iter().map(|name| {
             let version = runtime.block_on(service.version_of(&name)).map_err(CliError::failed)?;
             Ok((name, version))
         });
@@ -61,23 +77,36 @@ impl Adopt {
         let store = ClusterStore::create(&engine_of(&settings)).map_err(not_made)?;
         let (listing, _) = store.catalog.read().map_err(CliError::failed)?;
         check_free(&listing, &maps)?;
-        service.note_adopted().map_err(CliError::failed)?;
+        if !of_node {
+            service.note_adopted().map_err(CliError::failed)?;
+        }
         let output = output.with_bar_of(maps.len(), "maps");
         for (name, version) in maps {
+            let shared = || runtime.block_on(service.to_share(&name));
             let put = match listing.map(&name) {
-                Some(_) => None,
-                None => Some(entered(&store, &name, runtime.block_on(service.to_share(&name)))?),
+                Some(_) if of_node => begun_further(&store, &name, shared())?,
+                Some(_) => Put::Before,
+                None => Put::Now { bytes: entered(&store, &name, shared())?, before: None },
             };
             output.print(&Adopted::of(&name, version, put))?;
             output.step();
         }
         output.clear_bar();
-        output.say(next_step(&data_dir, store.engine.servers()))
+        match of_node {
+            true => output
+                .say("next: the folders of the other nodes, and then start all nodes with their folders"),
+            false => output.say(next_step(&data_dir, store.engine.servers())),
+        }
     }
 }
 
-/// The maps that are named, or all.
-fn chosen(service: &MapService, named: &[MapName]) -> Result<Vec<MapName>, CliError> {
+/// The maps that are named, or all; and those that are left out, since a node keeps former copies of maps under other
+/// names.
+fn chosen(
+    service: &MapService,
+    named: &[MapName],
+    of_node: bool,
+) -> Result<(Vec<MapName>, Vec<MapName>), CliError> {
     let named: BTreeSet<&MapName> = named.iter().collect();
     let is_meant = |name: &MapName| named.is_empty() || named.contains(name);
     if let Some(map) = service.unavailable_maps().into_iter().find(|map| is_meant(&map.name)) {
@@ -87,7 +116,8 @@ fn chosen(service: &MapService, named: &[MapName]) -> Result<Vec<MapName>, CliEr
     if let Some(missing) = named.iter().find(|name| !there.contains(name)) {
         return Err(CliError::failed(format!("--map: there is no map {missing} in the data folder")));
     }
-    Ok(there.into_iter().filter(is_meant).collect())
+    let is_former = |name: &MapName| of_node && !named.contains(name) && name.as_str().contains("-replaced-");
+    Ok(there.into_iter().filter(is_meant).partition(|name| !is_former(name)))
 }
 
 /// Refuses maps whose names others have in the cluster, before anything is put.
@@ -121,6 +151,21 @@ fn entered(
     }
 }
 
+/// Puts the copy of another node in the place of one that is not as far.
+fn begun_further(
+    store: &ClusterStore,
+    name: &MapName,
+    new: Result<NewMap, ServiceError>,
+) -> Result<Put, CliError> {
+    let failed = |why: &dyn Display| CliError::failed(format!("map {name} is as it was: {why}"));
+    let new = new.map_err(|error| failed(&error))?;
+    let before = store.begin_further(&new).map_err(|error| failed(&error))?;
+    match before < new.base.revision {
+        true => Ok(Put::Now { bytes: new.file.len(), before: Some(before) }),
+        false => Ok(Put::Before),
+    }
+}
+
 fn not_made(error: NoStore) -> CliError {
     match error {
         NoStore::Connect(error) => CliError::failed(error),
@@ -141,6 +186,14 @@ fn next_step(data_dir: &Path, servers: &str) -> String {
     )
 }
 
+/// What was put of a map.
+enum Put {
+    /// Nothing: it was there.
+    Before,
+    /// So many bytes, in the place of a copy of the revision `before`, if there was one.
+    Now { bytes: usize, before: Option<u64> },
+}
+
 #[derive(Serialize)]
 struct Adopted {
     map: String,
@@ -148,27 +201,31 @@ struct Adopted {
     revision: u64,
     /// Bytes that were put; none of a map that was in the cluster already.
     bytes: Option<usize>,
+    /// Revision of the copy of another node that this one took the place of.
+    in_place_of: Option<u64>,
 }
 
 impl Adopted {
-    fn of(name: &MapName, version: MapVersion, bytes: Option<usize>) -> Self {
+    fn of(name: &MapName, version: MapVersion, put: Put) -> Self {
         let (map, map_uuid) = (name.to_string(), version.map_uuid.to_string());
-        Self { map, map_uuid, revision: version.revision, bytes }
+        let (bytes, in_place_of) = match put {
+            Put::Before => (None, None),
+            Put::Now { bytes, before } => (Some(bytes), before),
+        };
+        Self { map, map_uuid, revision: version.revision, bytes, in_place_of }
     }
 }
 
 impl Display for Adopted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { map, map_uuid, revision, .. } = self;
-        match self.bytes {
-            None => write!(f, "map {map} ({map_uuid}) is in the cluster already"),
-            Some(size) => {
-                let size = bytes(size);
-                write!(
-                    f,
-                    "map {map} ({map_uuid}) is in the cluster now, at revision {revision}: {size} were put"
-                )
-            }
+        let Some(size) = self.bytes.map(bytes) else {
+            return write!(f, "map {map} ({map_uuid}) is in the cluster already");
+        };
+        write!(f, "map {map} ({map_uuid}) is in the cluster now, at revision {revision}")?;
+        if let Some(before) = self.in_place_of {
+            write!(f, " in the place of {before}")?;
         }
+        write!(f, ": {size} were put")
     }
 }

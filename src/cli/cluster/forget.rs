@@ -54,8 +54,8 @@ fn check_silent(seen: &Overview, node: &NodeName) -> Result<(), CliError> {
         Some(_) if !only_at(seen, node).is_empty() => {
             let maps = only_at(seen, node).join(", ");
             Err(CliError::failed(format!(
-                "node {node} is the only one that holds {maps}: put them on others first (`mrol cluster copies MAP NODE`), or \
-                 delete them"
+                "node {node} is the only one left that holds {maps}: put them on others first (`mrol cluster copies MAP NODE`), \
+                 or delete them"
             )))
         }
         Some(seen) if seen.is_live => Err(CliError::failed(format!(
@@ -66,11 +66,13 @@ fn check_silent(seen: &Overview, node: &NodeName) -> Result<(), CliError> {
     }
 }
 
-/// The maps that a node alone holds.
+/// The maps that no other node holds of which anybody knows.
 fn only_at(seen: &Overview, node: &NodeName) -> Vec<String> {
     let is_only = |map: &&SeenMap| match &map.holders {
         Holders::All => false,
-        Holders::Only(nodes) => nodes.len() == 1 && nodes.contains(node),
+        Holders::Only(nodes) => {
+            nodes.contains(node) && !nodes.iter().any(|it| it != node && seen.node(it).is_some())
+        }
     };
     seen.maps.iter().filter(is_only).map(|map| map.name.to_string()).collect()
 }
@@ -113,7 +115,7 @@ mod tests {
             holders: Holders::Only(holders.iter().map(|name| NodeName::new(name).unwrap()).collect()),
             copies: Vec::new(),
         };
-        let maps = vec![map("hall", &["n2", "n3"]), map("yard", &["n3"])];
+        let maps = vec![map("hall", &["n2", "n3"]), map("yard", &["n3", "n0"])];
         let seen = Overview { nodes: vec![seen("n1", true), seen("n2", false), seen("n3", false)], maps };
         let refused = |name: &str| {
             check_silent(&seen, &NodeName::new(name).unwrap()).map_err(|error| error.to_string())
@@ -124,7 +126,7 @@ mod tests {
         assert!(
             refused("n3")
                 .unwrap_err()
-                .contains("node n3 is the only one that holds yard: put them on others")
+                .contains("node n3 is the only one left that holds yard: put them on others")
         );
     }
 }

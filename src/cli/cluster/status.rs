@@ -103,8 +103,15 @@ impl Report {
         });
         let maps = self.maps.iter().flat_map(|map| {
             let name = &map.map;
-            let unled = map.leader.is_none().then(|| {
-                format!("NO NODE LEADS map {name}: it takes no changes; a leader that is gone is replaced within ten seconds")
+            let unsure_first = map.copies.iter().find(|copy| copy.unsure && copy.live && copy.lag == 0);
+            let unled = map.leader.is_none().then(|| match unsure_first {
+                Some(copy) => format!(
+                    "NO NODE LEADS map {name}: it takes no changes, since node {} is the furthest and cannot tell",
+                    copy.node
+                ),
+                None => format!(
+                    "NO NODE LEADS map {name}: it takes no changes; a leader that is gone is replaced within ten seconds"
+                ),
             });
             let parted = map.copies.iter().filter(|copy| copy.parted).map(move |copy| {
                 let node = &copy.node;
@@ -116,9 +123,10 @@ impl Report {
             let unsure = map.copies.iter().filter(|copy| copy.unsure).map(move |copy| {
                 let node = &copy.node;
                 format!(
-                    "map {name}: node {node} CANNOT TELL whether its copy has the history of the map's log. The next change \
-                     tells; while the copy is the furthest, none comes, and `mrol cluster keep NODE {name}` makes one copy \
-                     the map"
+                    "map {name}: node {node} CANNOT TELL whether its copy, at revision {}, has the history of the map's log. It \
+                     can once the log is beyond that. Where no node leads, `mrol cluster keep NODE {name}` makes one copy \
+                     the map",
+                    copy.revision
                 )
             });
             unled.into_iter().chain(parted).chain(unsure)
@@ -266,7 +274,7 @@ mod tests {
             "yard  NONE    any     all      3      20        a 7 UNSURE",
             "node b is SILENT: no beat within 3 s",
             "node a has NO ROOM (disk_full)",
-            "NO NODE LEADS map yard",
+            "NO NODE LEADS map yard: it takes no changes, since node a is the furthest and cannot tell",
             "map hall: the copy of node c has PARTED",
             "map yard: node a CANNOT TELL",
         ] {

@@ -15,8 +15,8 @@ use super::store::{BaseStore, NAME};
 /// How long each question may take.
 const WITHIN: Duration = Duration::from_secs(5);
 
-/// Files that are described at once: NATS gives no more. A map has two bases at most.
-const FILES_MAX: usize = 1_024;
+/// Files that are described at once.
+const FILES_AT_ONCE: usize = 1_000;
 
 /// What nothing points to: a file that is no map's base, or was deleted, by the number of its description, and pieces
 /// that belong to no file, by how many there are. Each by its subject.
@@ -67,8 +67,10 @@ impl BaseStore {
         let pieces = pieces.into_iter().filter(|(subject, _)| !whole.contains(subject));
         let (left, orphans): (BTreeMap<_, _>, _) =
             files.chain(pieces).partition(|(subject, number)| is_left(subject, *number));
-        for subject in left.keys() {
-            engine.block_on(self.purge(subject))?;
+        for (subject, number) in &left {
+            // What was put again since then under the name of a file stays. Pieces have names of their own.
+            let before = described.iter().any(|file| file.subject == *subject).then(|| number + 1);
+            engine.block_on(self.purge(subject, before))?;
         }
         Ok(Orphans(orphans))
     }
@@ -77,7 +79,8 @@ impl BaseStore {
     async fn described(&self) -> Result<Vec<Described>, BaseError> {
         #[derive(Serialize)]
         struct Question {
-            multi_last: [String; 1],
+            seq: u64,
+            next_by_subj: String,
             batch: usize,
         }
         #[derive(Deserialize)]
@@ -87,8 +90,6 @@ impl BaseStore {
             #[serde(default)]
             deleted: bool,
         }
-        let question = Question { multi_last: [format!("$O.{NAME}.M.>")], batch: FILES_MAX };
-        let found = self.engine.batch(&stream(), &question, WITHIN).await.map_err(unavailable)?;
         let read = |message: crate::engine::BatchMessage| {
             let Description { name, nuid, deleted } =
                 serde_json::from_slice(&message.payload).map_err(unavailable)?;
@@ -98,7 +99,19 @@ impl BaseStore {
             })?;
             Ok(Described { subject, sequence: message.sequence, name, nuid: (!deleted).then_some(nuid) })
         };
-        found.into_iter().map(read).collect()
+        let mut described: Vec<Described> = Vec::new();
+        loop {
+            let seq = described.last().map_or(1, |last| last.sequence + 1);
+            // Each has one description, the last.
+            let next_by_subj = format!("$O.{NAME}.M.>");
+            let question = Question { seq, next_by_subj, batch: FILES_AT_ONCE };
+            let found = self.engine.batch(&stream(), &question, WITHIN).await.map_err(unavailable)?;
+            if found.is_empty() {
+                return Ok(described);
+            }
+            let found: Result<Vec<_>, BaseError> = found.into_iter().map(read).collect();
+            described.extend(found?);
+        }
     }
 
     /// By the leader: how many files are described, and how many pieces of each name there are.
@@ -125,13 +138,19 @@ impl BaseStore {
         Ok((descriptions.len(), pieces))
     }
 
-    async fn purge(&self, subject: &str) -> Result<(), BaseError> {
+    /// Deletes what is of a subject, or what of it is before a number.
+    async fn purge(&self, subject: &str, before: Option<u64>) -> Result<(), BaseError> {
         #[derive(Serialize)]
         struct Question<'a> {
             filter: &'a str,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            seq: Option<u64>,
         }
         let endpoint = format!("STREAM.PURGE.{}", stream());
-        let purged = self.engine.call::<IgnoredAny>(&endpoint, &Question { filter: subject }, WITHIN).await;
+        let purged = self
+            .engine
+            .call::<IgnoredAny>(&endpoint, &Question { filter: subject, seq: before }, WITHIN)
+            .await;
         purged.map(|_| ()).map_err(unavailable)
     }
 }

@@ -14,6 +14,7 @@ use tokio::sync::watch;
 use uuid::Uuid;
 
 use super::lag::Lag;
+use super::own_beats::{NotPut, OwnBeats};
 use super::settings::NodeSettings;
 use super::view::{Seen, View};
 use crate::beat::{Beat, MapHead};
@@ -55,10 +56,11 @@ impl Heart {
     /// Beats until it is told to end.
     pub(super) fn beat(self, pulses: &Receiver<Pulse>) {
         let mut liveness = Liveness::new(self.settings.name.clone());
+        let mut own_beats = OwnBeats::new(self.joined.beats.clone(), self.settings.name.clone());
         let (mut before, mut is_silent) = (View::default(), false);
         loop {
             let begun = Instant::now();
-            match self.beat_once(&mut liveness, true) {
+            match self.beat_once(&mut own_beats, &mut liveness, true) {
                 Ok(own) => {
                     self.note_lag(&own, &before);
                     before = self.view.borrow().clone();
@@ -69,7 +71,8 @@ impl Heart {
                 }
                 Err(error) if !is_silent => {
                     is_silent = true;
-                    tracing::warn!(error, "this node's beats do not count: it takes no map over");
+                    tracing::warn!(%error, "this node's beats do not count: it takes no map over");
+                    self.view.send_modify(|view| view.is_unheard = true);
                 }
                 Err(_) => {}
             }
@@ -78,13 +81,13 @@ impl Heart {
                     Ok(Pulse::Beat) => {
                         std::thread::sleep(ASKED_EVERY);
                         if pulses.try_iter().any(|pulse| pulse == Pulse::End) {
-                            return self.end();
+                            return self.end(&mut own_beats);
                         }
-                        if let Err(error) = self.beat_once(&mut liveness, false) {
-                            tracing::debug!(error, "a beat that was asked for does not count");
+                        if let Err(error) = self.beat_once(&mut own_beats, &mut liveness, false) {
+                            tracing::debug!(%error, "a beat that was asked for does not count");
                         }
                     }
-                    Ok(Pulse::End) | Err(RecvTimeoutError::Disconnected) => return self.end(),
+                    Ok(Pulse::End) | Err(RecvTimeoutError::Disconnected) => return self.end(&mut own_beats),
                     Err(RecvTimeoutError::Timeout) => break,
                 }
             }
@@ -92,33 +95,35 @@ impl Heart {
     }
 
     /// Says that nobody is to wait for this node any more.
-    fn end(&self) {
+    fn end(&self, own_beats: &mut OwnBeats) {
         let last = Beat { has_ended: true, ..self.own_beat() };
-        if let Err(error) = self.joined.beats.put(&self.settings.name, &last) {
+        if let Err(error) = own_beats.put(&last) {
             tracing::debug!(%error, "the other nodes have to miss this one");
         }
     }
 
     /// Beats, and sees what the others say. Where it `counts`, the silence of others is measured by it.
-    fn beat_once(&self, liveness: &mut Liveness, counts: bool) -> Result<Beat, String> {
-        let text = |error: crate::bucket::BucketError| error.to_string();
+    fn beat_once(
+        &self,
+        own_beats: &mut OwnBeats,
+        liveness: &mut Liveness,
+        counts: bool,
+    ) -> Result<Beat, NotPut> {
         let own = self.own_beat();
-        let revision = self.joined.beats.put(&self.settings.name, &own).map_err(text)?;
+        let revision = own_beats.put(&own)?;
         match counts {
             true => liveness.own_beat_acknowledged(revision),
             false => liveness.beat_between_acknowledged(revision),
         }
         let View { beats, all_beats, .. } = *self.view.borrow();
         let (beats, all_beats) = (beats + u64::from(counts), all_beats + 1);
-        let read = self.joined.beats.read().map_err(text)?;
+        let read = self.joined.beats.read()?;
         let revisions = read.iter().map(|beat| (beat.node.clone(), beat.revision)).collect();
         if !liveness.beats_read(&revisions) {
-            // Of a server that lags, unless somebody else beats under this name.
-            let there = read.iter().find(|beat| beat.node == self.settings.name);
-            if let Some(other) = there.filter(|there| there.beat.grpc != own.grpc) {
-                return Err(format!("another process, at {}, beats as this node", other.beat.grpc));
-            }
-            self.view.send_modify(|view| (view.beats, view.all_beats) = (beats, all_beats));
+            // Of a server that lags.
+            self.view.send_modify(|view| {
+                (view.beats, view.all_beats, view.is_unheard) = (beats, all_beats, false);
+            });
             return Ok(own);
         }
         let others: Vec<NodeBeat> = read.into_iter().filter(|beat| beat.node != self.settings.name).collect();
@@ -139,7 +144,7 @@ impl Heart {
         };
         let others = others.into_iter().map(seen).collect();
         let (seen, is_settled) = (Some(Instant::now()), liveness.is_settled());
-        let now = View { beats, all_beats, revision, seen, is_settled, others };
+        let now = View { beats, all_beats, revision, seen, is_settled, is_unheard: false, others };
         tell_changes(&self.view.borrow(), &now);
         let grpc = now.others.iter().map(|(node, seen)| (node.clone(), seen.beat.grpc.clone()));
         // The secret of the cluster is sent there: in the clear only where this node serves in the clear as well.

@@ -147,6 +147,7 @@ impl Keeper {
         // Two beats ago, and one.
         let mut progress = [None::<Progress>; 2];
         let (mut claimed, mut claim_told) = (Claimed::default(), None);
+        let (mut doubt, mut last_said) = (Doubt::default(), None);
         loop {
             let view = self.view.borrow_and_update().clone();
             let now = lead.borrow_and_update().clone();
@@ -161,7 +162,6 @@ impl Keeper {
                 }
                 _ => false,
             };
-            let since = *waited_since.get_or_insert(view.beats);
             if leader_is_seen {
                 waited_since = None;
             }
@@ -169,11 +169,18 @@ impl Keeper {
                 if has_claimed {
                     claimed.note(claim, &view);
                 } else if claim != claim_told {
-                    // Whoever claimed waits for what this node has.
-                    claim_told = claim;
+                    // Whoever claimed waits for what this node has, and is waited for from then on.
+                    (claim_told, waited_since) = (claim, None);
                     _ = self.pulse.send(Pulse::Beat);
                 }
             }
+            if let Lead::Shared { agrees, .. } = now
+                && doubt.is_news(agrees, view.beats)
+            {
+                tracing::warn!(map = %self.name, revision = version.revision, "this node cannot tell whether its copy has the \
+                               history of the map's log: it takes over from nobody, and is not ready");
+            }
+            let since = *waited_since.get_or_insert(view.beats);
             let placement = self.placement.borrow_and_update().clone();
             let known = Known {
                 own: &self.node,
@@ -192,7 +199,7 @@ impl Keeper {
                 return Ended::Gone;
             }
             let choice = choose(&known);
-            self.act(choice, &view, &now).await;
+            self.act(choice, &view, &now, &mut last_said).await;
             if let Lead::Shared { is_here: true, sequence, .. } = &now {
                 let heads = view.holders(self.uuid).map(|(_, head)| head.sequence);
                 let needed = heads.min().unwrap_or(*sequence);
@@ -256,7 +263,8 @@ impl Keeper {
         true
     }
 
-    async fn act(&self, choice: Choice, view: &View, lead: &Lead) {
+    /// Does what was chosen; `last_said` is why that was not done before.
+    async fn act(&self, choice: Choice, view: &View, lead: &Lead, last_said: &mut Option<String>) {
         let done = match choice {
             Choice::Stay => return,
             Choice::Claim => {
@@ -279,9 +287,30 @@ impl Keeper {
                 self.service.hand_map_over(&self.name, node).await
             }
         };
-        if let Err(error) = done {
-            tracing::warn!(map = %self.name, why = error.message, "the lead stays where it is");
+        let said = done.err().map(|error| error.message);
+        if let Some(why) = said.as_ref().filter(|_| said != *last_said) {
+            tracing::warn!(map = %self.name, why, "the lead stays where it is");
         }
+        *last_said = said;
+    }
+}
+
+/// That a node cannot tell whether it has the history of the log: for a moment, while it reads, or for longer.
+#[derive(Debug, Default)]
+struct Doubt {
+    /// Its beats when that began, and whether it was told since.
+    since: Option<(u64, bool)>,
+}
+
+impl Doubt {
+    /// True once it has lasted for two beats.
+    fn is_news(&mut self, agrees: bool, beats: u64) -> bool {
+        if agrees {
+            self.since = None;
+            return false;
+        }
+        let (since, is_told) = self.since.get_or_insert((beats, false));
+        beats >= *since + 2 && !std::mem::replace(is_told, beats >= *since + 2)
     }
 }
 

@@ -7,7 +7,8 @@
 //!    hold, by what is seen.
 //! 3. `blocking`: questions to NATS, which block.
 //! 4. `lag`: whether it is where the others are.
-//! 5. `heart`: beats every two seconds, and sees who is gone.
+//! 5. `own_beats`, `heart`: beats every two seconds, as long as no other process has the node's name, and sees who is
+//!    gone.
 //! 6. `cutting`, `sweeping`: puts a base and cuts the front of a log off; deletes what nothing points to.
 //! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads
 //!    it where it is to.
@@ -24,6 +25,7 @@ mod heart;
 mod keeper;
 mod keepers;
 mod lag;
+mod own_beats;
 mod release;
 mod room;
 mod server;

@@ -190,8 +190,8 @@ impl Node {
         !sees || lag.is_over(lag_max)
     }
 
-    /// Hands the maps that it leads over to others, waits until those have taken over, for some seconds at most, and
-    /// ends its work: what is asked of it from then on goes on to them.
+    /// Hands the maps that it leads over to others, in some seconds at most: they take over when they have read that.
+    /// What is asked of this node until it ends goes on to them.
     pub async fn leave(&self, service: &MapService) {
         let until = Instant::now() + Self::LEAVING_MAX;
         let led = |service: &MapService| {

@@ -28,7 +28,7 @@ impl Sweeping {
         let (joined, before) = (self.joined.clone(), std::mem::take(&mut self.found));
         match blocking(move || joined.bases.sweep(&joined.pointers, &before)).await {
             Ok(found) => self.found = found,
-            Err(error) => tracing::debug!(%error, "the store of bases was not swept: it is tried again"),
+            Err(error) => tracing::warn!(%error, "the store of bases was not swept: it is tried again"),
         }
     }
 }

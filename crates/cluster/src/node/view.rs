@@ -23,6 +23,8 @@ pub(super) struct View {
     pub(super) seen: Option<Instant>,
     /// True once it is known of each of the others whether it is gone.
     pub(super) is_settled: bool,
+    /// True while this node's beats are not heard: what others do about it is not known.
+    pub(super) is_unheard: bool,
     /// The other nodes, those that are gone among them.
     pub(super) others: BTreeMap<NodeName, Seen>,
 }

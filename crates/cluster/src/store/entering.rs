@@ -43,6 +43,32 @@ impl ClusterStore {
         Ok(entered?)
     }
 
+    /// Puts a further copy of a map in the place of the one that its log begins with, while no node has begun with that:
+    /// the log is empty. Says the revision of the one that was there before. Not for an async thread.
+    ///
+    /// # Errors
+    /// Says why the copy was not put.
+    pub fn begin_further(&self, NewMap { uuid, base, file }: &NewMap) -> Result<u64, EnterError> {
+        let failed = |error: &dyn std::fmt::Display| EnterError::NotPut(error.to_string());
+        let there = self.pointers.read(*uuid).map_err(|error| failed(&error))?;
+        let (before, revision) = there.ok_or_else(|| failed(&format!("map {uuid} has no base")))?;
+        if before.revision >= base.revision {
+            return Ok(before.revision);
+        }
+        let log = JetStreamLog::open(&self.engine, *uuid).map_err(|error| failed(&error))?;
+        if log.used().map_err(|error| failed(&error))?.last_sequence > 0 {
+            return Err(failed(
+                &"a node has begun with an older copy: end all nodes, and begin with a new NATS",
+            ));
+        }
+        self.bases.put(*uuid, base, file).map_err(|error| failed(&error))?;
+        self.pointers.change(*uuid, base, revision).map_err(|error| failed(&error))?;
+        if let Err(error) = self.bases.delete(*uuid, &before) {
+            tracing::debug!(%error, "the copy that was there before is still there");
+        }
+        Ok(before.revision)
+    }
+
     fn put(&self, NewMap { uuid, base, file }: &NewMap) -> Result<(), EnterError> {
         let failed = |error: &dyn std::fmt::Display| EnterError::NotPut(error.to_string());
         let log = JetStreamLog::create(&self.engine, *uuid).map_err(|error| failed(&error))?;

@@ -104,7 +104,12 @@ fn a_file_whose_upload_was_cut_short_is_not_there_and_is_put_again() {
     assert!(!store.has(map, &unused).unwrap());
     assert!(!pieces.is_empty());
     assert_eq!(sweep(&pieces), Orphans::default());
-    // So does the description of one that was deleted.
+    // So do the descriptions of those that were deleted, however many.
+    for number in 0..1_100 {
+        let one = base_at(Position { sequence: 100 + number, id: None });
+        store.put(map, &one, b"a file").unwrap();
+        store.delete(map, &one).unwrap();
+    }
     store.put(map, &unused, &file).unwrap();
     store.delete(map, &unused).unwrap();
     let deleted = sweep(&Orphans::default());

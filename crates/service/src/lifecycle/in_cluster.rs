@@ -86,7 +86,7 @@ impl MapService {
     }
 
     /// From now on a server by itself does not open the data folder any more: a cluster adopts maps of it. A node does,
-    /// whichever is first, and [`ServiceSettings::may_be_adopted`](crate::ServiceSettings) opens it to adopt more.
+    /// whichever is first, and [`Adoption`](crate::Adoption) opens it to adopt more.
     ///
     /// # Errors
     /// When the disk refuses.

@@ -3,7 +3,7 @@
 use super::opening::not_stored;
 use crate::cluster::Cluster;
 use crate::error::{Reason, ServiceError};
-use crate::settings::ServiceSettings;
+use crate::settings::{Adoption, ServiceSettings};
 use mrol_store::DataDir;
 
 /// Refuses a folder that belongs to somebody else, and notes that it belongs to this node from now on. What a server
@@ -21,7 +21,8 @@ pub(super) fn check_node(data_dir: &DataDir, settings: &ServiceSettings) -> Resu
                 "the data folder belongs to node {there}: start with cluster.node = {there:?}, not \"{node}\""
             )
         }
-        (None, Some("")) if settings.may_be_adopted => return Ok(()),
+        (None, Some("")) if settings.adoption.is_some() => return Ok(()),
+        (None, Some(_)) if settings.adoption == Some(Adoption::OfNode) => return Ok(()),
         (None, Some("")) => "maps of the data folder were adopted by a cluster: start with --cluster and --node, or take it out \
                              of the cluster for good with --leave-cluster"
             .to_owned(),

@@ -213,8 +213,18 @@ fn problems_of(map: &SeenMap, seen: &Overview) -> Vec<Finding> {
     }
     for copy in map.copies.iter().filter(|copy| copy.is_live && !copy.head.is_parted && !copy.head.agrees) {
         problems.push(format!(
-            "{name}: node {} cannot tell whether its copy has the history of the log: the next change tells",
-            copy.node
+            "{name}: node {node} cannot tell whether its copy, at revision {}, has the history of the log: it can once the log is \
+             beyond that; where no node leads, `mrol cluster keep NODE {name}` makes one copy the map",
+            copy.head.revision,
+            node = copy.node
+        ));
+    }
+    let unknown: Vec<_> =
+        map.holders.names().filter(|node| seen.node(node).is_none()).map(ToString::to_string).collect();
+    if !unknown.is_empty() {
+        problems.push(format!(
+            "{name} is to be held by nodes that nobody knows: {}; `mrol cluster copies {name} NODES` names others",
+            unknown.join(", ")
         ));
     }
     let holders = seen.nodes.iter().filter(|node| node.is_live && map.holders.contains(&node.node));

@@ -49,7 +49,7 @@ pub(super) struct Known<'a> {
     pub(super) placement: &'a Placement,
     /// The others.
     pub(super) view: &'a View,
-    /// Its own beats since it has seen no node lead the map.
+    /// Its own beats since it has seen no node lead the map, and no new claim of another.
     pub(super) waited: u64,
     /// A revision of the beats' bucket after its last claim of the map, once there is one.
     pub(super) claimed_at: Option<u64>,
@@ -66,13 +66,15 @@ pub(super) fn choose(known: &Known<'_>) -> Choice {
             Some(node) => Choice::HandOver(node.clone()),
             None => Choice::Stay,
         },
-        // Before it has seen the others, it does not know what they read.
-        _ if known.view.beats == 0 => Choice::Stay,
+        // Before it has seen the others, it does not know what they read; unheard, it may not be alone of its name.
+        _ if known.view.beats == 0 || known.view.is_unheard => Choice::Stay,
         Lead::Shared { has_claimed: true, claim, .. } => match furthest(known) {
             Some(node) => Choice::HandOver(node.clone()),
             None if all_have_heard(known, *claim) => Choice::Open(*claim),
             None => Choice::Stay,
         },
+        // It would be refused.
+        Lead::Shared { agrees: false, .. } => Choice::Stay,
         Lead::Shared { leader, .. } if is_led_elsewhere(known, leader.as_ref()) => Choice::Stay,
         Lead::Shared { leader, .. } if !may_claim(known, leader.as_ref()) => Choice::Stay,
         // What it would write, not all could read: nodes are exchanged one by one.

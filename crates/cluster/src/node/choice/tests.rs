@@ -147,6 +147,8 @@ fn who_writes_what_another_cannot_read_does_not_take_over() {
     assert_eq!(by(8, &view(&[gone, ("c", true, Some(5), true)])), Choice::Claim, "it has parted already");
     let unseen = View { beats: 0, ..view(&[]) };
     assert_eq!(by(8, &unseen), Choice::Stay, "who is there is not known yet");
+    let unheard = View { is_unheard: true, ..view(&[gone]) };
+    assert_eq!(by(7, &unheard), Choice::Stay, "another process may have its name");
 }
 
 #[test]
@@ -268,6 +270,35 @@ fn who_was_given_the_lead_and_alone_has_what_the_log_lost_gives_it_back_whoever_
     assert_eq!(by("b", 4), Choice::Claim);
     assert_eq!(by("b", 5), Choice::Stay, "a has it too");
     assert_eq!(by("c", 4), Choice::Stay, "it was not given the lead");
+}
+
+#[test]
+fn who_cannot_tell_its_history_claims_nothing_and_is_given_nothing() {
+    let unsure = Lead::Shared {
+        leader: None,
+        is_here: false,
+        has_claimed: false,
+        epoch: 1,
+        claim: None,
+        sequence: 5,
+        agrees: false,
+    };
+    assert_eq!(chosen(&unsure, &[], PATIENCE, None), Choice::Stay);
+    let claimed = Lead::Shared {
+        leader: Some(node("b")),
+        is_here: false,
+        has_claimed: true,
+        epoch: 1,
+        claim: Some(Uuid::from_u128(1)),
+        sequence: 5,
+        agrees: true,
+    };
+    let mut others = view(&[("a", true, Some(9), false)]);
+    let by = |others: &View, lead: &Lead| chosen_by(7, lead, others, None);
+    assert_eq!(by(&others, &claimed), Choice::HandOver(node("a")));
+    others.others.get_mut(&node("a")).unwrap().beat.maps.get_mut(&MAP).unwrap().agrees = false;
+    assert_ne!(by(&others, &claimed), Choice::HandOver(node("a")));
+    assert_eq!(by(&others, &led_by(None, false)), Choice::Stay, "it may have what others acknowledged");
 }
 
 #[test]

@@ -1,0 +1,97 @@
+//! All servers of NATS are lost with their disks: the nodes have the maps.
+
+use std::fs;
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use mrol::geometry::{Point, Pose};
+use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
+use mrol::service::ScanRequest;
+
+use crate::site::{NODES, Site, WITHIN, program};
+
+/// Inserts a scan, again until it is acknowledged.
+fn insert(site: &Site, addresses: &str, map: &MapName, number: u64) {
+    let client = site.client(addresses);
+    let scan = ScanRequest {
+        scan_id: Some(number),
+        guess: Guess::Pose(Pose::identity()),
+        at_guess: true,
+        ..ScanRequest::new(
+            RobotName::new("robot").unwrap(),
+            vec![Point::new(1.0 + number as f32, 0.0, 0.0)].into(),
+        )
+    };
+    let begun = Instant::now();
+    while let Err(error) = site.runtime().block_on(client.insert_scan(map, scan.clone())) {
+        assert!(begun.elapsed() < WITHIN, "{error}");
+        sleep(Duration::from_millis(20));
+    }
+}
+
+/// Waits until a node has so many scans in a map.
+fn wait_for(site: &Site, node: usize, map: &MapName, scans: usize) {
+    let begun = Instant::now();
+    while site.state(node, map).is_none_or(|state| (state.scans, state.voxels) != (scans, scans)) {
+        assert!(begun.elapsed() < WITHIN, "node {node}: {:?}", site.state(node, map));
+        sleep(Duration::from_millis(50));
+    }
+}
+
+/// Takes the maps of a node's folder into a new NATS; what was printed.
+fn adopt(site: &Site, node: usize) -> String {
+    let mut command = Command::new(program());
+    command.args(["cluster", "adopt", site.data(node).to_str().unwrap(), "--of-node"]);
+    let output = command.args(["--nats", &site.nats.urls().join(",")]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn where_all_of_nats_is_lost_the_furthest_copy_of_each_map_is_taken_into_a_new_one() {
+    let Some(mut site) = Site::start() else { return };
+    let maps = ["hall", "yard"].map(|name| MapName::new(name).unwrap());
+    for map in &maps {
+        site.create(map);
+        (0..4).for_each(|number| insert(&site, &site.all_grpc(0), map, number));
+    }
+    // All have it before anything is cut off.
+    for map in &maps {
+        (0..NODES).for_each(|node| wait_for(&site, node, map, 4));
+    }
+    // One that does not lead is cut off, and behind from then on.
+    let led = maps.each_ref().map(|map| site.leader(map));
+    let behind = (0..NODES).find(|node| !led.contains(node)).unwrap();
+    site.cut_off(behind);
+    let further = (behind + 1) % NODES;
+    for map in &maps {
+        (4..7).for_each(|number| insert(&site, &site.grpc(further), map, number));
+    }
+    (0..NODES).for_each(|node| site.kill_node(node));
+    site.mend(behind);
+    site.nats.kill_all();
+    (0..NODES).for_each(|server| fs::remove_dir_all(site.nats.store(server)).unwrap());
+    site.nats.start_all();
+    drop(site.nats.engine());
+
+    // In any order.
+    let last = (behind + 2) % NODES;
+    for (node, words) in [
+        (behind, "now, at revision 4:"),
+        (further, "now, at revision 7 in the place of 4"),
+        (last, "already"),
+    ] {
+        let said = adopt(&site, node);
+        assert_eq!(said.matches(&format!("is in the cluster {words}")).count(), maps.len(), "{said}");
+    }
+    (0..NODES).for_each(|node| site.start_node(node));
+    (0..NODES).for_each(|node| site.wait_until_ready(node));
+    for map in &maps {
+        insert(&site, &site.all_grpc(behind), map, 7);
+        (0..NODES).for_each(|node| wait_for(&site, node, map, 8));
+        let states: Vec<_> = (0..NODES).map(|node| site.state(node, map)).collect();
+        assert!(states.iter().all(|state| *state == states[0]), "{states:?}");
+    }
+}
