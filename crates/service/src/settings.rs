@@ -61,7 +61,8 @@ pub struct ServiceSettings {
 /// Whose data folder is opened for a cluster to adopt its maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Adoption {
-    /// That of a server by itself; or one of which a cluster has adopted maps before, and which no node has opened since.
+    /// That of a server by itself; or one of which a cluster has adopted maps before, and which no node has opened
+    /// since.
     OfServer,
     /// That of a node too, whose cluster lost what NATS had of it.
     OfNode,

@@ -43,8 +43,8 @@ impl ClusterStore {
         Ok(entered?)
     }
 
-    /// Puts a further copy of a map in the place of the one that its log begins with, while no node has begun with that:
-    /// the log is empty. Says the revision of the one that was there before. Not for an async thread.
+    /// Puts a further copy of a map in the place of the one that its log begins with, while no node has begun with
+    /// that: the log is empty. Says the revision of the one that was there before. Not for an async thread.
     ///
     /// # Errors
     /// Says why the copy was not put.

@@ -2,7 +2,7 @@
 
 use mrol_service::replication::NodeName;
 
-use super::Known;
+use super::known::Known;
 use crate::catalog::Placement;
 
 /// Beats for which a node that does not lead what it should is waited for: it may be starting, or another may be better

@@ -2,7 +2,7 @@
 
 use mrol_service::replication::NodeName;
 
-use super::Known;
+use super::known::Known;
 use crate::beat::MapHead;
 use crate::catalog::Placement;
 

@@ -3,7 +3,7 @@
 use mrol_service::replication::NodeName;
 use uuid::Uuid;
 
-use super::Known;
+use super::known::Known;
 use crate::beat::MapHead;
 
 /// The live node that is furthest and could take over, where that is further than this one.
@@ -15,8 +15,9 @@ pub(super) fn furthest<'a>(known: &Known<'a>) -> Option<&'a NodeName> {
 
 /// True where every other live node has said how far it is since this one made its `claim`: it had read it, or beat
 /// later than this node after the claim. What it said before is no measure: the log may have lost its newest messages
-/// since. Nor is it that it said nothing of the map: it may have taken its copy since. One whose copy is further and has
-/// not joined its log since that node was started is waited for: it may be the only one that has what the log has lost.
+/// since. Nor is it that it said nothing of the map: it may have taken its copy since. One whose copy is further and
+/// has not joined its log since that node was started is waited for: it may be the only one that has what the log has
+/// lost.
 pub(super) fn all_have_heard(known: &Known<'_>, claim: Option<Uuid>) -> bool {
     let holders = &known.placement.holders;
     known.view.others.iter().filter(|(_, seen)| seen.is_live).all(|(node, seen)| {

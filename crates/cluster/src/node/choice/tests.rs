@@ -2,11 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use mrol_service::Lead;
+use mrol_service::replication::NodeName;
+use uuid::Uuid;
+
 use super::claiming::PATIENCE;
-use super::*;
+use super::{Choice, Known, choose};
 use crate::beat::{Beat, MapHead};
-use crate::catalog::Holders;
-use crate::node::view::Seen;
+use crate::catalog::{Holders, Placement};
+use crate::node::view::{Seen, View};
 
 const MAP: Uuid = Uuid::from_u128(1);
 
