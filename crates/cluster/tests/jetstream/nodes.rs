@@ -275,6 +275,35 @@ fn another_map_of_the_same_name_is_kept_under_another_name() {
     waited("it is deleted there too", || a.version("hall").is_none());
 }
 
+/// A second process that has a node's name by mistake follows, and neither claims nor is heard; it is heard once the
+/// first is gone.
+#[test]
+fn a_second_process_under_the_name_of_a_node_disturbs_nobody() {
+    let Some(nats) = NatsServers::start(1) else { return };
+    drop(nats.engine());
+    let folders: Vec<_> = (0..3).map(|_| TempDir::new().unwrap()).collect();
+    let (a, b) = (Server::start(&nats, "a", folders[0].path()), Server::start(&nats, "b", folders[1].path()));
+    assert!(a.create("hall"));
+    retried(|| leader(&[&a, &b], "hall").insert("hall", 0));
+    let epoch = || match &*b.runtime.block_on(b.service.lead_of(&name("hall"))).unwrap().borrow() {
+        Lead::Shared { epoch, .. } => *epoch,
+        other => panic!("{other:?}"),
+    };
+    let (led_by_a, before) = (a.leads("hall"), epoch());
+    let twin = Server::start(&nats, "a", folders[2].path());
+    for number in 1..20 {
+        retried(|| leader(&[&a, &b], "hall").insert("hall", number));
+        std::thread::sleep(Duration::from_millis(400));
+    }
+    assert_eq!((epoch(), a.leads("hall")), (before, led_by_a), "the lead has moved");
+    assert!(!twin.node.status().is_joined && twin.node.is_behind(WITHIN));
+    waited("it follows", || twin.version("hall") == a.version("hall"));
+    a.vanish();
+    waited("it is heard", || twin.node.status().is_joined);
+    assert_eq!(retried(|| leader(&[&twin, &b], "hall").insert("hall", 20)), 21);
+    waited("equal copies", || twin.version("hall") == b.version("hall"));
+}
+
 #[test]
 fn a_server_by_itself_or_another_node_does_not_open_the_folder_of_a_node() {
     let folder = TempDir::new().unwrap();
