@@ -290,18 +290,18 @@ fn a_second_process_under_the_name_of_a_node_disturbs_nobody() {
         other => panic!("{other:?}"),
     };
     let (led_by_a, before) = (a.leads("hall"), epoch());
-    let twin = Server::start(&nats, "a", folders[2].path());
+    let second = Server::start(&nats, "a", folders[2].path());
     for number in 1..20 {
         retried(|| leader(&[&a, &b], "hall").insert("hall", number));
         std::thread::sleep(Duration::from_millis(400));
     }
     assert_eq!((epoch(), a.leads("hall")), (before, led_by_a), "the lead has moved");
-    assert!(!twin.node.status().is_joined && twin.node.is_behind(WITHIN));
-    waited("it follows", || twin.version("hall") == a.version("hall"));
+    assert!(!second.node.status().is_joined && second.node.is_behind(WITHIN));
+    waited("it follows", || second.version("hall") == a.version("hall"));
     a.vanish();
-    waited("it is heard", || twin.node.status().is_joined);
-    assert_eq!(retried(|| leader(&[&twin, &b], "hall").insert("hall", 20)), 21);
-    waited("equal copies", || twin.version("hall") == b.version("hall"));
+    waited("it is heard", || second.node.status().is_joined);
+    assert_eq!(retried(|| leader(&[&second, &b], "hall").insert("hall", 20)), 21);
+    waited("equal copies", || second.version("hall") == b.version("hall"));
 }
 
 #[test]
