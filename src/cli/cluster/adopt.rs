@@ -76,22 +76,34 @@ impl Adopt {
         let maps = maps.collect::<Result<Vec<(MapName, MapVersion)>, CliError>>()?;
         let store = ClusterStore::create(&engine_of(&settings)).map_err(not_made)?;
         let (listing, _) = store.catalog.read().map_err(CliError::failed)?;
-        check_free(&listing, &maps)?;
+        let maps = match of_node {
+            true => without_others(&listing, maps, &output)?,
+            false => check_free(&listing, &maps).map(|()| maps)?,
+        };
         if !of_node {
             service.note_adopted().map_err(CliError::failed)?;
         }
         let output = output.with_bar_of(maps.len(), "maps");
+        let mut failed = Vec::new();
         for (name, version) in maps {
             let shared = || runtime.block_on(service.to_share(&name));
             let put = match listing.map(&name) {
-                Some(_) if of_node => begun_further(&store, &name, shared())?,
-                Some(_) => Put::Before,
-                None => Put::Now { bytes: entered(&store, &name, shared())?, before: None },
+                Some(_) if of_node => begun_further(&store, &name, shared()),
+                Some(_) => Ok(Put::Before),
+                None => entered(&store, &name, shared()).map(|bytes| Put::Now { bytes, before: None }),
             };
-            output.print(&Adopted::of(&name, version, put))?;
+            match put {
+                Ok(put) => output.print(&Adopted::of(&name, version, put))?,
+                // Maps behind it may be in this folder alone.
+                Err(error) if of_node => failed.push(error.to_string()),
+                Err(error) => return Err(error),
+            }
             output.step();
         }
         output.clear_bar();
+        if !failed.is_empty() {
+            return Err(CliError::failed(failed.join("\n")));
+        }
         match of_node {
             true => output
                 .say("next: the folders of the other nodes, and then start all nodes with their folders"),
@@ -131,6 +143,27 @@ fn check_free(listing: &Listing, maps: &[(MapName, MapVersion)]) -> Result<(), C
         )));
     }
     Ok(())
+}
+
+/// The maps but those whose names others have in the cluster: a map that was deleted and made anew while the node was
+/// down.
+fn without_others(
+    listing: &Listing,
+    maps: Vec<(MapName, MapVersion)>,
+    output: &Output,
+) -> Result<Vec<(MapName, MapVersion)>, CliError> {
+    let is_other = |(name, version): &(MapName, MapVersion)| {
+        listing.map(name).is_some_and(|entry| entry.uuid != version.map_uuid)
+    };
+    let (others, maps): (Vec<_>, Vec<_>) = maps.into_iter().partition(is_other);
+    for (name, version) in others {
+        output.say(format!(
+            "map {name} is left out: that of the folder is {}, and the cluster has another one by now. If this is the right one, \
+             begin anew with an empty NATS and this folder",
+            version.map_uuid
+        ))?;
+    }
+    Ok(maps)
 }
 
 /// Enters a map, and says how many bytes were put.

@@ -64,6 +64,9 @@ impl Entering {
     }
 
     fn joined(&self) -> Result<ClusterStore, ServiceError> {
+        if self.view.borrow().is_unheard {
+            return Err(no_quorum(&"this node's beats are not heard"));
+        }
         self.joined
             .get()
             .cloned()

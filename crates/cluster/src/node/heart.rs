@@ -57,24 +57,13 @@ impl Heart {
     pub(super) fn beat(self, pulses: &Receiver<Pulse>) {
         let mut liveness = Liveness::new(self.settings.name.clone());
         let mut own_beats = OwnBeats::new(self.joined.beats.clone(), self.settings.name.clone());
-        let (mut before, mut is_silent) = (View::default(), false);
+        let (mut before, mut last_said) = (View::default(), None);
         loop {
             let begun = Instant::now();
-            match self.beat_once(&mut own_beats, &mut liveness, true) {
-                Ok(own) => {
-                    self.note_lag(&own, &before);
-                    before = self.view.borrow().clone();
-                    if is_silent {
-                        tracing::info!("this node's beats count again");
-                    }
-                    is_silent = false;
-                }
-                Err(error) if !is_silent => {
-                    is_silent = true;
-                    tracing::warn!(%error, "this node's beats do not count: it takes no map over");
-                    self.view.send_modify(|view| view.is_unheard = true);
-                }
-                Err(_) => {}
+            let beat = self.beat_once(&mut own_beats, &mut liveness, true);
+            if let Some(own) = self.heard(beat, &mut last_said) {
+                self.note_lag(&own, &before);
+                before = self.view.borrow().clone();
             }
             while let Some(rest) = BEAT_EVERY.checked_sub(begun.elapsed()) {
                 match pulses.recv_timeout(rest) {
@@ -83,15 +72,33 @@ impl Heart {
                         if pulses.try_iter().any(|pulse| pulse == Pulse::End) {
                             return self.end(&mut own_beats);
                         }
-                        if let Err(error) = self.beat_once(&mut own_beats, &mut liveness, false) {
-                            tracing::debug!(%error, "a beat that was asked for does not count");
-                        }
+                        let beat = self.beat_once(&mut own_beats, &mut liveness, false);
+                        self.heard(beat, &mut last_said);
                     }
                     Ok(Pulse::End) | Err(RecvTimeoutError::Disconnected) => return self.end(&mut own_beats),
                     Err(RecvTimeoutError::Timeout) => break,
                 }
             }
         }
+    }
+
+    /// The beat, where it was heard. Notes whether this node's are, and says why not, `last_said` being what was said last.
+    fn heard(&self, beat: Result<Beat, NotPut>, last_said: &mut Option<String>) -> Option<Beat> {
+        let said = beat.as_ref().err().map(ToString::to_string);
+        self.view.send_if_modified(|view| {
+            let is_new = view.is_unheard != said.is_some();
+            view.is_unheard = said.is_some();
+            is_new
+        });
+        match &said {
+            Some(why) if said != *last_said => {
+                tracing::warn!(why, "this node's beats do not count: it takes no map over")
+            }
+            None if last_said.is_some() => tracing::info!("this node's beats count again"),
+            _ => {}
+        }
+        *last_said = said;
+        beat.ok()
     }
 
     /// Says that nobody is to wait for this node any more.
@@ -121,9 +128,7 @@ impl Heart {
         let revisions = read.iter().map(|beat| (beat.node.clone(), beat.revision)).collect();
         if !liveness.beats_read(&revisions) {
             // Of a server that lags.
-            self.view.send_modify(|view| {
-                (view.beats, view.all_beats, view.is_unheard) = (beats, all_beats, false);
-            });
+            self.view.send_modify(|view| (view.beats, view.all_beats) = (beats, all_beats));
             return Ok(own);
         }
         let others: Vec<NodeBeat> = read.into_iter().filter(|beat| beat.node != self.settings.name).collect();

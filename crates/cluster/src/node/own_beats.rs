@@ -8,8 +8,9 @@ use crate::beat::Beat;
 use crate::beats::{BEAT_EVERY, Beats};
 use crate::bucket::BucketError;
 
-/// How long a beat of another process under this name stays as it is before it is of one that is gone.
-const SILENT_AFTER: Duration = BEAT_EVERY.saturating_mul(2).saturating_add(Duration::from_secs(1));
+/// How long a beat of another process under this name stays as it is before it is of one that is gone: longer than the
+/// other nodes wait.
+const SILENT_AFTER: Duration = BEAT_EVERY.saturating_mul(4).saturating_add(Duration::from_secs(1));
 
 /// Puts a node's beats, each in the place of its last: who finds another there was not alone.
 pub(super) struct OwnBeats {
@@ -29,7 +30,8 @@ pub(super) enum NotPut {
     Unavailable(#[from] BucketError),
     /// The name is another's.
     #[error(
-        "another process, at {0}, beats as this node: give one of the two another name, and a folder of its own"
+        "a process at {0} has beaten as this node: if that was this node before it was restarted, it is waited for nine \
+         seconds; if it is another, give one of the two another name, and a folder of its own"
     )]
     OtherProcess(String),
 }

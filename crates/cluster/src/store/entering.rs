@@ -56,12 +56,16 @@ impl ClusterStore {
             return Ok(before.revision);
         }
         let log = JetStreamLog::open(&self.engine, *uuid).map_err(|error| failed(&error))?;
-        if log.used().map_err(|error| failed(&error))?.last_sequence > 0 {
-            return Err(failed(
-                &"a node has begun with an older copy: end all nodes, and begin with a new NATS",
-            ));
-        }
+        let check_unused = || match log.used().map_err(|error| failed(&error))?.last_sequence {
+            0 => Ok(()),
+            _ => {
+                Err(failed(&"a node has begun with an older copy: end all nodes, and begin with a new NATS"))
+            }
+        };
+        check_unused()?;
         self.bases.put(*uuid, base, file).map_err(|error| failed(&error))?;
+        // A node may have been started meanwhile.
+        check_unused()?;
         self.pointers.change(*uuid, base, revision).map_err(|error| failed(&error))?;
         if let Err(error) = self.bases.delete(*uuid, &before) {
             tracing::debug!(%error, "the copy that was there before is still there");

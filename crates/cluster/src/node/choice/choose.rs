@@ -31,6 +31,8 @@ pub(in crate::node) fn choose(known: &Known<'_>) -> Choice {
         Lead::Shared { leader, .. } if !is_read_by_all(known) && !must_give_back(known, leader.as_ref()) => {
             Choice::Stay
         }
+        // Nodes that were just started, as this one, may have more: they are waited for until they beat, or are gone.
+        _ if !known.view.is_settled => Choice::Stay,
         Lead::Shared { leader, .. } if is_first(known, leader.as_ref()) => Choice::Claim,
         _ => Choice::Stay,
     }

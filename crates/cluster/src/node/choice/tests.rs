@@ -38,7 +38,7 @@ fn view(others: &[(&str, bool, Option<u64>, bool)]) -> View {
         (node(name), Seen { beat, revision: 20, is_live })
     };
     let others = others.iter().map(seen).collect::<BTreeMap<_, _>>();
-    View { beats: 10, others, ..View::default() }
+    View { beats: 10, is_settled: true, others, ..View::default() }
 }
 
 fn led_by(leader: Option<&str>, is_here: bool) -> Lead {
@@ -153,6 +153,8 @@ fn who_writes_what_another_cannot_read_does_not_take_over() {
     assert_eq!(by(8, &unseen), Choice::Stay, "who is there is not known yet");
     let unheard = View { is_unheard: true, ..view(&[gone]) };
     assert_eq!(by(7, &unheard), Choice::Stay, "another process may have its name");
+    let unsettled = View { is_settled: false, ..view(&[gone]) };
+    assert_eq!(by(7, &unsettled), Choice::Stay, "others may be starting");
 }
 
 #[test]
