@@ -82,7 +82,8 @@ impl Heart {
         }
     }
 
-    /// The beat, where it was heard. Notes whether this node's are, and says why not, `last_said` being what was said last.
+    /// The beat, where it was heard. Notes whether this node's are, and says why not, `last_said` being what was said
+    /// last.
     fn heard(&self, beat: Result<Beat, NotPut>, last_said: &mut Option<String>) -> Option<Beat> {
         let said = beat.as_ref().err().map(ToString::to_string);
         self.view.send_if_modified(|view| {
