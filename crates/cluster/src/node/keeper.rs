@@ -14,11 +14,12 @@ use uuid::Uuid;
 
 use super::blocking::{blocking, no_quorum};
 use super::choice::{Choice, Known, choose};
-use super::claimed::{Claimed, LOOKED_EVERY};
+use super::claimed::LOOKED_EVERY;
 use super::cutting::Cutting;
 use super::heart::Pulse;
-use super::release::{Progress, Release};
+use super::release::Release;
 use super::settings::BaseLimits;
+use super::so_far::SoFar;
 use super::view::View;
 use crate::catalog::Placement;
 use crate::following::Following;
@@ -143,11 +144,7 @@ impl Keeper {
     /// gone, or the log begins behind what it has.
     async fn lead_where_due(&mut self, mut lead: watch::Receiver<Lead>, log: Arc<JetStreamLog>) -> Ended {
         let mut cutting = Cutting::of(self.joined.clone(), log, self.uuid, self.bases);
-        let (mut waited_since, mut release, mut beats_then) = (None, None, 0);
-        // Two beats ago, and one.
-        let mut progress = [None::<Progress>; 2];
-        let (mut claimed, mut claim_told) = (Claimed::default(), None);
-        let (mut doubt, mut last_said) = (Doubt::default(), None);
+        let (mut so_far, mut release, mut last_said) = (SoFar::default(), None, None);
         loop {
             let view = self.view.borrow_and_update().clone();
             let now = lead.borrow_and_update().clone();
@@ -155,43 +152,25 @@ impl Keeper {
             if self.service.is_behind_log(&self.name).await.unwrap_or(false) {
                 return Ended::Behind;
             }
-            let leader_is_seen = match &now {
-                Lead::Shared { is_here: true, .. } => true,
-                Lead::Shared { leader: Some(leader), .. } => {
-                    view.holders(self.uuid).any(|(node, head)| node == leader && head.leads)
-                }
-                _ => false,
-            };
-            if leader_is_seen {
-                waited_since = None;
+            let noted = so_far.note(self.uuid, &now, &view);
+            if noted.is_claimed {
+                _ = self.pulse.send(Pulse::Beat);
             }
-            if let Lead::Shared { has_claimed, claim, .. } = now {
-                if has_claimed {
-                    claimed.note(claim, &view);
-                } else if claim != claim_told {
-                    // Whoever claimed waits for what this node has, and is waited for from then on.
-                    (claim_told, waited_since) = (claim, None);
-                    _ = self.pulse.send(Pulse::Beat);
-                }
-            }
-            if let Lead::Shared { agrees, .. } = now
-                && doubt.is_news(agrees, view.beats)
-            {
+            if noted.is_doubtful {
                 tracing::warn!(map = %self.name, revision = version.revision, "this node cannot tell whether its copy has the \
                                history of the map's log: it takes over from nobody, and is not ready");
             }
-            let since = *waited_since.get_or_insert(view.beats);
             let placement = self.placement.borrow_and_update().clone();
             let known = Known {
                 own: &self.node,
                 map: self.uuid,
                 revision: version.revision,
-                sequence_before: progress[0].map_or(0, |before| before.sequence),
+                sequence_before: so_far.before().map_or(0, |before| before.sequence),
                 lead: &now,
                 placement: &placement,
                 view: &view,
-                waited: view.beats - since,
-                claimed_at: claimed.at,
+                waited: so_far.waited(&view),
+                claimed_at: so_far.claimed.at,
                 record_version: self.record_version,
             };
             let no_room = view.without_room(self.uuid);
@@ -209,7 +188,7 @@ impl Keeper {
                 release = None;
             } else {
                 let release = release.get_or_insert_with(Release::default);
-                let is_due = release.is_due(self.uuid, &placement.holders, &view, progress[0]);
+                let is_due = release.is_due(self.uuid, &placement.holders, &view, so_far.before());
                 if is_due && self.is_copy_of_others(&now) && self.drop_copy(&placement).await {
                     return Ended::Gone;
                 }
@@ -219,14 +198,10 @@ impl Keeper {
                     if changed.is_err() {
                         return Ended::Gone;
                     }
-                    let beats = self.view.borrow().beats;
-                    if std::mem::replace(&mut beats_then, beats) != beats {
-                        let there = progress_of(&lead.borrow(), version.revision);
-                        progress = [progress[1].filter(|_| there.is_some()), there];
-                    }
+                    so_far.note_progress(&lead.borrow(), version.revision, &self.view.borrow());
                 }
-                () = tokio::time::sleep(LOOKED_EVERY), if claimed.waits(&now) => {
-                    claimed.looks += 1;
+                () = tokio::time::sleep(LOOKED_EVERY), if so_far.claimed.waits(&now) => {
+                    so_far.claimed.looks += 1;
                     _ = self.pulse.send(Pulse::Beat);
                 }
                 () = leader_changed(&mut lead, &now) => {}
@@ -295,39 +270,12 @@ impl Keeper {
     }
 }
 
-/// That a node cannot tell whether it has the history of the log: for a moment, while it reads, or for longer.
-#[derive(Debug, Default)]
-struct Doubt {
-    /// Its beats when that began, and whether it was told since.
-    since: Option<(u64, bool)>,
-}
-
-impl Doubt {
-    /// True once it has lasted for two beats.
-    fn is_news(&mut self, agrees: bool, beats: u64) -> bool {
-        if agrees {
-            self.since = None;
-            return false;
-        }
-        let (since, is_told) = self.since.get_or_insert((beats, false));
-        beats >= *since + 2 && !std::mem::replace(is_told, beats >= *since + 2)
-    }
-}
-
 /// Why a node ends looking whether it is to lead.
 enum Ended {
     /// The copy is gone, or the node ends.
     Gone,
     /// The log begins behind what the copy has.
     Behind,
-}
-
-/// How far a copy is, at `revision`; none before it has joined its log, where that says nothing.
-fn progress_of(lead: &Lead, revision: u64) -> Option<Progress> {
-    match lead {
-        Lead::Shared { sequence, .. } => Some(Progress { sequence: *sequence, revision }),
-        _ => None,
-    }
 }
 
 /// Waits until the log names another node, or this one has taken over or lost the lead.

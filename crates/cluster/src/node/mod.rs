@@ -10,11 +10,11 @@
 //! 5. `own_beats`, `heart`: beats every two seconds, as long as no other process has the node's name, and sees who is
 //!    gone.
 //! 6. `cutting`, `sweeping`: puts a base and cuts the front of a log off; deletes what nothing points to.
-//! 7. `claimed`, `keeper`: what a node waits for that has claimed a map; keeps this node's copy of one map, and leads
-//!    it where it is to.
-//! 8. `keepers`: one for each map of the cluster's list that this node holds.
-//! 9. `entering`: enters maps into the list and deletes them, for the operations of the service.
-//! 10. `server`: [`Node`], which puts these together.
+//! 7. `claimed`, `so_far`: what a node waits for that has claimed a map, and what it has seen so far of who leads one.
+//! 8. `keeper`: keeps this node's copy of one map, and leads it where it is to.
+//! 9. `keepers`: one for each map of the cluster's list that this node holds.
+//! 10. `entering`: enters maps into the list and deletes them, for the operations of the service.
+//! 11. `server`: [`Node`], which puts these together.
 
 mod blocking;
 mod choice;
@@ -30,6 +30,7 @@ mod release;
 mod room;
 mod server;
 mod settings;
+mod so_far;
 mod sweeping;
 mod view;
 
