@@ -5,30 +5,14 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use mrol::geometry::{Point, Pose};
-use mrol::map::{MapName, RobotName};
-use mrol::mapping::Guess;
-use mrol::service::ScanRequest;
+use mrol::geometry::Point;
+use mrol::map::MapName;
 
 use crate::site::{NODES, Site, WITHIN, program};
 
-/// Inserts a scan, again until it is acknowledged.
+/// Puts one voxel more into a map.
 fn insert(site: &Site, addresses: &str, map: &MapName, number: u64) {
-    let client = site.client(addresses);
-    let scan = ScanRequest {
-        scan_id: Some(number),
-        guess: Guess::Pose(Pose::identity()),
-        at_guess: true,
-        ..ScanRequest::new(
-            RobotName::new("robot").unwrap(),
-            vec![Point::new(1.0 + number as f32, 0.0, 0.0)].into(),
-        )
-    };
-    let begun = Instant::now();
-    while let Err(error) = site.runtime().block_on(client.insert_scan(map, scan.clone())) {
-        assert!(begun.elapsed() < WITHIN, "{error}");
-        sleep(Duration::from_millis(20));
-    }
+    site.insert(addresses, map, number, Point::new(1.0 + number as f32, 0.0, 0.0));
 }
 
 /// Waits until a node has so many scans in a map.

@@ -6,10 +6,9 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use mrol::geometry::{Point, Pose};
-use mrol::map::{MapName, RobotName};
-use mrol::mapping::Guess;
-use mrol::service::{MapService, ScanRequest, ServiceSettings};
+use mrol::geometry::Point;
+use mrol::map::MapName;
+use mrol::service::{MapService, ServiceSettings};
 use mrol::store::OpeningProgress;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -55,28 +54,7 @@ fn adopt(site: &Site) -> String {
 
 /// Puts one voxel more into the map, far from all others; the revision that it makes.
 fn insert(site: &Site, addresses: &str, number: u64) -> u64 {
-    let client = site.client(addresses);
-    let scan = ScanRequest {
-        scan_id: Some(number),
-        guess: Guess::Pose(Pose::identity()),
-        at_guess: true,
-        ..ScanRequest::new(
-            RobotName::new("late").unwrap(),
-            vec![Point::new(300.0 + number as f32, 0.0, 0.0)].into(),
-        )
-    };
-    let begun = Instant::now();
-    loop {
-        match site.runtime().block_on(client.insert_scan(&office(), scan.clone())) {
-            Ok(answer) => return answer.version.revision,
-            Err(error) => {
-                let reason = error.reason().unwrap_or_default();
-                assert!(["no_quorum", "not_leader", "outcome_unknown"].contains(&reason), "{error}");
-                assert!(begun.elapsed() < WITHIN, "{error}");
-            }
-        }
-        sleep(Duration::from_millis(20));
-    }
+    site.insert(addresses, &office(), number, Point::new(300.0 + number as f32, 0.0, 0.0))
 }
 
 /// Waits until a map is at a node as is expected.

@@ -6,8 +6,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use mrol::client::{Client, NewMap};
-use mrol::map::{ContentHash, MapName};
-use mrol::service::MapInfo;
+use mrol::geometry::{Point, Pose};
+use mrol::map::{ContentHash, MapName, RobotName};
+use mrol::mapping::Guess;
+use mrol::service::{MapInfo, ScanRequest};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use uuid::Uuid;
@@ -224,6 +226,29 @@ impl Site {
         let client = self.client(&self.all_grpc(0));
         let settings = NewMap { levels: Some(2), ..NewMap::of(0.5) };
         self.runtime.block_on(client.create_map(map, settings)).unwrap();
+    }
+
+    /// Puts one voxel more into a map, under a number, again until that is acknowledged; the revision that it makes.
+    pub(crate) fn insert(&self, addresses: &str, map: &MapName, number: u64, place: Point) -> u64 {
+        let client = self.client(addresses);
+        let scan = ScanRequest {
+            scan_id: Some(number),
+            guess: Guess::Pose(Pose::identity()),
+            at_guess: true,
+            ..ScanRequest::new(RobotName::new("late").unwrap(), vec![place].into())
+        };
+        let begun = Instant::now();
+        loop {
+            match self.runtime.block_on(client.insert_scan(map, scan.clone())) {
+                Ok(answer) => return answer.version.revision,
+                Err(error) => {
+                    let reason = error.reason().unwrap_or_default();
+                    assert!(["no_quorum", "not_leader", "outcome_unknown"].contains(&reason), "{error}");
+                    assert!(begun.elapsed() < WITHIN, "{error}");
+                }
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 
     /// Revision, content, scans and voxels of a map at a node.

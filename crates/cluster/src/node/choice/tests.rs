@@ -53,6 +53,19 @@ fn led_by(leader: Option<&str>, is_here: bool) -> Lead {
     }
 }
 
+/// `b` has made this claim, and has not taken over.
+fn claimed_by_b(claim: u128) -> Lead {
+    Lead::Shared {
+        leader: Some(node("b")),
+        is_here: false,
+        has_claimed: true,
+        epoch: 1,
+        claim: Some(Uuid::from_u128(claim)),
+        sequence: 5,
+        agrees: true,
+    }
+}
+
 /// What `b` at revision 5 does.
 fn chosen(
     lead: &Lead,
@@ -184,17 +197,8 @@ fn who_leads_by_the_log_and_was_started_again_takes_over_before_others() {
 #[test]
 fn what_was_claimed_is_opened_once_all_have_said_how_far_they_are_since() {
     let own = node("b");
-    let lead = |claim| Lead::Shared {
-        leader: Some(own.clone()),
-        is_here: false,
-        has_claimed: true,
-        epoch: 1,
-        claim: Some(Uuid::from_u128(claim)),
-        sequence: 5,
-        agrees: true,
-    };
     let then = |claim, claimed_at, others: &[(&str, bool, Option<u64>, bool)]| {
-        let (lead, view) = (lead(claim), view(others));
+        let (lead, view) = (claimed_by_b(claim), view(others));
         let known = Known {
             own: &own,
             map: MAP,
@@ -238,15 +242,7 @@ fn what_was_claimed_is_opened_once_all_have_said_how_far_they_are_since() {
 #[test]
 fn a_copy_that_has_not_joined_its_log_and_is_further_is_waited_for() {
     let then = |unjoined: u64| {
-        let lead = Lead::Shared {
-            leader: Some(node("b")),
-            is_here: false,
-            has_claimed: true,
-            epoch: 1,
-            claim: Some(Uuid::from_u128(1)),
-            sequence: 5,
-            agrees: true,
-        };
+        let lead = claimed_by_b(1);
         let mut others = view(&[("a", true, None, false)]);
         others.others.get_mut(&node("a")).unwrap().beat.unjoined.insert(MAP, unjoined);
         let (own, placement) = (node("b"), Placement { holders: Holders::All, leader: None });
@@ -290,15 +286,7 @@ fn who_cannot_tell_its_history_claims_nothing_and_is_given_nothing() {
         agrees: false,
     };
     assert_eq!(chosen(&unsure, &[], PATIENCE, None), Choice::Stay);
-    let claimed = Lead::Shared {
-        leader: Some(node("b")),
-        is_here: false,
-        has_claimed: true,
-        epoch: 1,
-        claim: Some(Uuid::from_u128(1)),
-        sequence: 5,
-        agrees: true,
-    };
+    let claimed = claimed_by_b(1);
     let mut others = view(&[("a", true, Some(9), false)]);
     let by = |others: &View, lead: &Lead| chosen_by(7, lead, others, None);
     assert_eq!(by(&others, &claimed), Choice::HandOver(node("a")));
