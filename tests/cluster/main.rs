@@ -21,6 +21,7 @@ mod lost_nats;
 mod nats;
 mod released;
 mod site;
+mod watches;
 
 use std::time::{Duration, Instant};
 

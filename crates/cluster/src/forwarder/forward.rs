@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use tokio_stream::StreamExt;
 
-use super::failure::{Asked, error_of, no_address, not_opened};
+use super::failure::{Asked, error_of, no_address, no_place, not_opened};
+use super::line::Line;
 use super::peer::Peer;
 use super::settings::{ForwarderError, ForwarderSettings};
 use mrol_client::{Client, ClientError, Credentials};
@@ -17,8 +18,8 @@ use mrol_service::{
     KeepOutAnswer, Later, PutKeepOut, ScanAnswer, ScanEvent, ScanRequest, ServiceError, Undo, UndoAnswer,
 };
 
-/// Takes the calls of a node's callers on to other nodes. It holds one connection a node, made when it is first needed
-/// and again once it is lost, and sends every call once.
+/// Takes the calls of a node's callers on to other nodes, and sends every call once. It holds a connection a node for
+/// calls, and others for watches, which last.
 #[derive(Debug)]
 pub struct Forwarder {
     settings: ForwarderSettings,
@@ -58,16 +59,22 @@ impl Forwarder {
     where
         Fut: Future<Output = Result<A, ClientError>>,
     {
-        let client = self.client(call).await?.with_timeout(self.settings.call_timeout);
+        let peer = self.peer(call)?;
+        let place = peer.calls.place(self.settings.place_timeout).await;
+        let _place = place.ok_or_else(|| no_place(&call.to))?;
+        let client = self.client(call, &peer, &peer.calls).await?.with_timeout(self.settings.call_timeout);
         send(client).await.map_err(|error| error_of(&call.to, asked, error))
     }
 
-    /// A client of the node that is asked, for the caller.
-    async fn client(&self, call: &ForwardedCall) -> Result<Client, ServiceError> {
-        let peer = self.peers.lock().get(&call.to).cloned();
-        let peer = peer.ok_or_else(|| no_address(&call.to))?;
+    /// The node that is asked.
+    fn peer(&self, call: &ForwardedCall) -> Result<Arc<Peer>, ServiceError> {
+        self.peers.lock().get(&call.to).cloned().ok_or_else(|| no_address(&call.to))
+    }
+
+    /// A client of the node that is asked, by a connection to it, for the caller.
+    async fn client(&self, call: &ForwardedCall, peer: &Peer, line: &Line) -> Result<Client, ServiceError> {
         let ForwarderSettings { node, connect_timeout, .. } = &self.settings;
-        let client = peer.client(&self.credentials, node, *connect_timeout).await;
+        let client = line.client(&peer.address, &self.credentials, node, *connect_timeout).await;
         let client = client.map_err(|error| error_of(&call.to, Asked::Question, error))?;
         Ok(client.on_behalf_of(call.caller.as_ref()))
     }
@@ -131,14 +138,20 @@ impl Forward for Forwarder {
         query: EventsQuery,
     ) -> Later<'a, Result<ForwardedEvents, ServiceError>> {
         Box::pin(async move {
-            let client = self.client(call).await?;
+            let peer = self.peer(call)?;
+            let (line, place) = peer.for_watch().ok_or_else(|| no_place(&call.to))?;
+            let client = self.client(call, &peer, &line).await?;
             // The watch itself has no end; its beginning has.
             let open = client.watch_events(&call.map, query);
             let opened = tokio::time::timeout(self.settings.call_timeout, open).await;
             let node = call.to.clone();
             let failure = move |error| error_of(&node, Asked::Question, error);
             let messages = opened.map_err(|_| not_opened(&call.to))?.map_err(&failure)?;
-            let events: ForwardedEvents = Box::pin(messages.map(move |message| message.map_err(&failure)));
+            let told = move |message: Result<_, _>| {
+                let _held = (&line, &place);
+                message.map_err(&failure)
+            };
+            let events: ForwardedEvents = Box::pin(messages.map(told));
             Ok(events)
         })
     }
@@ -155,6 +168,7 @@ mod tests {
     use tokio::io::AsyncReadExt;
     use tokio::net::{TcpListener, TcpStream};
 
+    use super::super::line::CALLS_MAX;
     use super::*;
     use mrol_map::map::MapName;
     use mrol_service::{Reason, UndoTarget};
@@ -171,6 +185,7 @@ mod tests {
             secret: Some("mrol_1".to_owned()),
             connect_timeout: CONNECT_TIMEOUT,
             call_timeout: Duration::from_millis(500),
+            place_timeout: Duration::from_millis(100),
             ..ForwarderSettings::new(node("a"))
         });
         let forwarder = forwarder.unwrap();
@@ -217,6 +232,27 @@ mod tests {
         assert_eq!(listed.reason, Reason::NoQuorum);
         let watched = forwarder.watch_events(&call_to("b"), query).await.map(drop).unwrap_err();
         assert_eq!(watched.reason, Reason::NoQuorum);
+        hears.abort();
+    }
+
+    #[tokio::test]
+    async fn a_change_that_has_no_place_on_the_connection_was_not_sent() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let forwarder = Arc::new(forwarder(&listener.local_addr().unwrap().to_string()));
+        let hears = tokio::spawn(async move {
+            let mut heard = Vec::new();
+            while let Ok((connection, _)) = listener.accept().await {
+                heard.push(connection);
+            }
+        });
+        let mut calls = tokio::task::JoinSet::new();
+        for _ in 0..=CALLS_MAX {
+            let forwarder = Arc::clone(&forwarder);
+            calls.spawn(async move { undo(&forwarder, "b").await });
+        }
+        let told = calls.join_all().await;
+        let not_sent = told.iter().filter(|error| error.reason == Reason::NoQuorum).count();
+        assert_eq!(not_sent, 1, "{told:?}");
         hears.abort();
     }
 

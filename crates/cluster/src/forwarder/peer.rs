@@ -1,62 +1,55 @@
-//! The connection to another node.
+//! The connections to another node.
 
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
-use mrol_client::{ClientError, Credentials, NodeClient};
 use mrol_map::sync::{Mutex, Rank};
-use mrol_service::replication::NodeName;
 
-/// Another node: where it is, and the connection to it.
+use super::line::{Line, Place};
+
+/// Another node: where it is, and the connections to it.
 #[derive(Debug)]
 pub(super) struct Peer {
     /// Address of its gRPC listener.
     pub(super) address: String,
-    connected: Mutex<Option<NodeClient>>,
-    /// Held while a connection is made, with when making the last one failed, and why.
-    connecting: tokio::sync::Mutex<Option<(Instant, ClientError)>>,
+    /// Of calls that are answered once.
+    pub(super) calls: Line,
+    /// Of watches, which keep their places: each has room for many, and there are as many as are needed.
+    watches: Mutex<Vec<Arc<Line>>>,
 }
 
 impl Peer {
     pub(super) fn at(address: String) -> Self {
-        Self {
-            address,
-            connected: Mutex::new(Rank::Brief, None),
-            connecting: tokio::sync::Mutex::const_new(None),
-        }
+        Self { address, calls: Line::new(), watches: Mutex::new(Rank::Brief, Vec::new()) }
     }
 
-    /// The connection, which is made where there is none or the last one was lost. Of calls that wait for one, the
-    /// first makes it for all; where it cannot, all hear of it, and none waits longer than `timeout`.
-    ///
-    /// # Errors
-    /// When the node does not answer, or the two do not trust each other.
-    pub(super) async fn client(
-        &self,
-        credentials: &Credentials,
-        own: &NodeName,
-        timeout: Duration,
-    ) -> Result<NodeClient, ClientError> {
-        if let Some(client) = self.connected() {
-            return Ok(client);
+    /// A connection for a watch, with the place on it.
+    pub(super) fn for_watch(&self) -> Option<(Arc<Line>, Place)> {
+        let mut lines = self.watches.lock();
+        lines.retain(|line| !line.is_unused());
+        if let Some(found) = lines.iter().find_map(|line| Some((Arc::clone(line), line.free_place()?))) {
+            return Some(found);
         }
-        let asked = Instant::now();
-        let mut failed = self.connecting.lock().await;
-        if let Some(client) = self.connected() {
-            return Ok(client);
-        }
-        match &*failed {
-            Some((at, error)) if *at >= asked => return Err(error.clone()),
-            _ => {}
-        }
-        let connected = NodeClient::connect(&self.address, credentials, own.clone(), timeout).await;
-        match &connected {
-            Ok(client) => *self.connected.lock() = Some(client.clone()),
-            Err(error) => *failed = Some((Instant::now(), error.clone())),
-        }
-        connected
+        let line = Arc::new(Line::new());
+        let place = line.free_place()?;
+        lines.push(Arc::clone(&line));
+        Some((line, place))
     }
+}
 
-    fn connected(&self) -> Option<NodeClient> {
-        self.connected.lock().clone().filter(|client| !client.is_gone())
+#[cfg(test)]
+mod tests {
+    use super::super::line::CALLS_MAX;
+    use super::*;
+
+    #[test]
+    fn watches_take_connections_as_they_need_them_and_none_of_those_of_calls() {
+        let peer = Peer::at("http://127.0.0.1:1".to_owned());
+        let held: Vec<_> = (0..2 * CALLS_MAX + 1).map(|_| peer.for_watch().unwrap()).collect();
+        assert!(peer.calls.is_unused());
+        assert_eq!(peer.watches.lock().len(), 3);
+        assert!(Arc::ptr_eq(&held[0].0, &held[1].0) && !Arc::ptr_eq(&held[0].0, &held[CALLS_MAX].0));
+        drop(held);
+        let _held = peer.for_watch().unwrap();
+        assert_eq!(peer.watches.lock().len(), 1, "those that nobody needs are given up");
     }
 }

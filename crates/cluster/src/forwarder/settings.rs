@@ -23,6 +23,9 @@ pub struct ForwarderSettings {
     /// How long a call may take: longer than the longest of the limits on changes, `limits.undo_time_max_s`, or callers
     /// hear `outcome_unknown` of changes that the other node would still have made.
     pub call_timeout: Duration,
+    /// How long a call may wait until fewer others are on their way to the same node: it is refused then, and was not
+    /// sent.
+    pub place_timeout: Duration,
 }
 
 /// Files of a certificate in PEM, followed by its signers, and of its private key.
@@ -56,6 +59,9 @@ impl ForwarderSettings {
     /// Whoever waits for a node that is gone is to hear of it soon.
     pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 
+    /// Others end meanwhile, as a rule.
+    pub const PLACE_TIMEOUT: Duration = Duration::from_secs(5);
+
     /// How `node` asks nodes that ask for no keys, and whose certificates the system trusts.
     pub fn new(node: NodeName) -> Self {
         Self {
@@ -65,6 +71,7 @@ impl ForwarderSettings {
             certificate: None,
             connect_timeout: Self::CONNECT_TIMEOUT,
             call_timeout: Self::CALL_TIMEOUT,
+            place_timeout: Self::PLACE_TIMEOUT,
         }
     }
 
@@ -94,6 +101,7 @@ impl std::fmt::Debug for ForwarderSettings {
             .field("certificate", &self.certificate)
             .field("connect_timeout", &self.connect_timeout)
             .field("call_timeout", &self.call_timeout)
+            .field("place_timeout", &self.place_timeout)
             .finish()
     }
 }

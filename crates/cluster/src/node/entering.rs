@@ -176,7 +176,10 @@ impl Entering {
         }
         let live = self.live_holders(entry);
         if live.is_empty() {
-            return Err(try_again(&format!("none of the nodes that hold map {name} ({holders}) is live")));
+            let also = if self.is_secured { " and serves by TLS, as this one does" } else { "" };
+            return Err(try_again(&format!(
+                "none of the nodes that hold map {name} ({holders}) is live{also}"
+            )));
         }
         Err(ServiceError::map_elsewhere(name, live))
     }
