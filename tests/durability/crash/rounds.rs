@@ -302,6 +302,6 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
     let remaker::Counts { created, restored, deleted, inserted, failed } = remaker.counts;
     assert!(created + restored > 1 && deleted > 0 && inserted > 0, "no map was made again");
     assert!(rounds() < 100 || restored > 0, "no map was restored");
-    assert!(disk.is_none() || failed > 0, "no creation failed");
+    assert!(disk.is_none() || rounds() < 100 || failed > 0, "no creation failed");
     assert!(unanswered > 0 && damaged > 0, "{unanswered} unanswered, {damaged} damaged");
 }
