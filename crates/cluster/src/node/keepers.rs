@@ -229,7 +229,9 @@ impl Keepers {
     /// Takes away what is left at NATS. One of the nodes is enough.
     async fn tidy(&mut self) {
         let view = self.view.borrow().clone();
-        if view.others.iter().any(|(node, seen)| seen.is_live && *node < self.node) {
+        // One that does not see the others, or is not the only one of its name, cannot tell which is the first.
+        let is_blind = view.beats == 0 || view.is_unheard;
+        if is_blind || view.others.iter().any(|(node, seen)| seen.is_live && *node < self.node) {
             return;
         }
         self.sweeping.look().await;
