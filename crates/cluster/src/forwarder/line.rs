@@ -8,8 +8,8 @@ use mrol_map::sync::{Mutex, Rank};
 use mrol_service::replication::NodeName;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// Calls on a connection at once. A server takes 128: one more would wait there for the end of another, and nobody could
-/// tell whether it was sent.
+/// Calls on a connection at once. A server takes 128: one more would wait there for the end of another, and nobody
+/// could tell whether it was sent.
 pub(super) const CALLS_MAX: usize = 100;
 
 /// One connection to another node, which is made when it is first needed and again once it is lost.
