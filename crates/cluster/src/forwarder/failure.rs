@@ -9,10 +9,6 @@ use mrol_service::{Reason, ServiceError};
 /// When to ask again where a node does not answer: another takes over after some seconds.
 const NODE_SOON: Duration = Duration::from_secs(2);
 
-/// Why a node refuses a caller whom this one has let in.
-const DISTRUSTED: &str = "it does not know this node's secret, or the caller: cluster.secret_file and the keys are to be the \
-                          same on all nodes";
-
 /// What was asked of another node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Asked {
@@ -28,8 +24,6 @@ pub(super) fn error_of(node: &NodeName, asked: Asked, error: ClientError) -> Ser
         ClientError::Refused { reason, message, retry_after, .. } => {
             let reason = reason.as_deref().and_then(Reason::of_word);
             match (reason, asked) {
-                // That is what it says of the secret of this node, or of a caller of whom it does not know.
-                (Some(Reason::KeyUnknown | Reason::KeyMissing), _) => unanswered(node, DISTRUSTED),
                 // It went on without whoever waits for it.
                 (Some(Reason::Deadline | Reason::CallerGone) | None, Asked::Change) => {
                     unknown(node, &message)
@@ -109,7 +103,6 @@ mod tests {
     fn what_the_other_node_says_is_told_as_it_is() {
         for &reason in Reason::ALL {
             let said = ServiceError::new(reason, "no").retry_after(Duration::from_millis(1500));
-            let is_distrust = matches!(reason, Reason::KeyUnknown | Reason::KeyMissing);
             let error = ClientError::Refused {
                 code: status_code(reason.code()),
                 reason: Some(reason.as_str().to_owned()),
@@ -117,11 +110,6 @@ mod tests {
                 retry_after: said.retry_after,
                 elsewhere: Vec::new(),
             };
-            if is_distrust {
-                let told = [Asked::Question, Asked::Change].map(|asked| told(asked, error.clone()));
-                assert!(told.iter().all(|told| told.reason == Reason::NoQuorum), "{told:?}");
-                continue;
-            }
             assert_eq!(told(Asked::Question, error.clone()), said);
             let of_change = told(Asked::Change, error);
             match reason {
