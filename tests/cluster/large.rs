@@ -138,7 +138,8 @@ struct Changes<'a> {
 
 impl<'a> Changes<'a> {
     fn at(site: &'a Site, sizes: &'a Sizes, nodes: &[usize]) -> Self {
-        let clients = nodes.iter().map(|node| site.client(&site.grpc(*node))).collect();
+        let client = |node: &usize| site.client(&site.grpc(*node)).with_timeout(PATIENCE);
+        let clients = nodes.iter().map(client).collect();
         Self { site, sizes, clients, told: Vec::new(), took: Vec::new() }
     }
 
