@@ -1,12 +1,13 @@
 //! NATS servers of a test, which it kills and starts again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use mrol_cluster::{Credentials, Engine, EngineSettings};
@@ -203,18 +204,23 @@ pub(crate) fn eventually<T, E: std::fmt::Display>(mut call: impl FnMut() -> Resu
     }
 }
 
-/// Ports that nobody listens at. They are none of those that the kernel gives connections by itself: a server that is
-/// started again finds its own still free.
+/// Ports that nobody listens at, and that were not given before: whoever got them may still be starting. They are none
+/// of those that the kernel gives connections by itself: a server that is started again finds its own still free.
 pub(crate) fn free_ports(count: usize) -> Vec<u16> {
+    static GIVEN: Mutex<BTreeSet<u16>> = Mutex::new(BTreeSet::new());
+    let mut given = GIVEN.lock().unwrap();
     let mut listeners = BTreeMap::new();
     while listeners.len() < count {
         // Seeded anew in each process, and with each.
         let number = RandomState::new().build_hasher().finish();
         let port = 10_000 + (number % 22_000) as u16;
-        if let Ok(listener) = TcpListener::bind(("127.0.0.1", port)) {
+        if !given.contains(&port)
+            && let Ok(listener) = TcpListener::bind(("127.0.0.1", port))
+        {
             listeners.insert(port, listener);
         }
     }
+    given.extend(listeners.keys());
     listeners.into_keys().collect()
 }
 
