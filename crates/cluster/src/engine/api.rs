@@ -40,12 +40,19 @@ impl ApiError {
     pub(crate) const NO_MESSAGE: u32 = 10037;
     /// There is no such stream.
     pub(crate) const NO_STREAM: u32 = 10059;
+    /// The servers have no leader (yet).
+    const NO_LEADER: u32 = 10008;
     /// The stream's last sequence, or that of a subject, is not what was expected.
     const WRONG_LAST_SEQUENCE: u32 = 10071;
     /// The same, of a subject with a message on its way.
     const WRONG_LAST_SEQUENCE_ON_ITS_WAY: u32 = 10164;
     /// A message of this id is on its way, or was lost or refused moments ago.
     const ID_IN_PROCESS: u32 = 10158;
+
+    /// True where the servers have no leader (yet).
+    pub(crate) fn is_no_leader(&self) -> bool {
+        self.err_code == Self::NO_LEADER
+    }
 
     /// True where the id of a message is known, and what became of it is not.
     pub(crate) fn is_id_in_process(&self) -> bool {

@@ -62,6 +62,9 @@ async fn check_jetstream(engine: &Engine) -> Result<(), ConnectError> {
     let servers = engine.servers().to_owned();
     match engine.call::<IgnoredAny>("INFO", &(), GREETING_MAX).await {
         Ok(_) => Ok(()),
+        Err(CallError::Api(error)) if error.is_no_leader() => {
+            Err(ConnectError::NoQuorum { servers, cause: error.to_string() })
+        }
         Err(error @ (CallError::Unanswered(Unanswered::NoResponders(_)) | CallError::Api(_))) => {
             Err(ConnectError::NoJetStream { servers, cause: error.to_string() })
         }

@@ -57,3 +57,21 @@ fn an_nkey_is_a_credential() {
     let error = Engine::connect(&settings).unwrap_err();
     assert!(matches!(error, ConnectError::Credentials { .. }), "{error}");
 }
+
+#[test]
+fn servers_without_a_leader_lack_a_quorum_and_not_the_right() {
+    let Some(mut servers) = NatsServers::start(3) else { return };
+    drop(servers.engine());
+    servers.kill(0);
+    servers.kill(1);
+    // The last server answers for some seconds that it does not know who leads, and then that nobody does.
+    let said = eventually(|| match Engine::connect(&servers.settings()) {
+        Ok(_) => Err("connected".to_owned()),
+        Err(error @ ConnectError::NoQuorum { .. }) if error.to_string().contains("10008") => Ok(error),
+        Err(error) => {
+            assert!(matches!(error, ConnectError::NoQuorum { .. }), "{error}");
+            Err(error.to_string())
+        }
+    });
+    assert!(said.to_string().contains("most of the NATS servers must run"), "{said}");
+}

@@ -239,7 +239,8 @@ fn problems_of(map: &SeenMap, seen: &Overview) -> Vec<Finding> {
 mod tests {
     use std::collections::BTreeMap;
 
-    use mrol_cluster::{Beat, MapHead, StreamServers};
+    use mrol_cluster::{Beat, Holders, MapCopy, MapHead, StreamServers};
+    use mrol_map::map::MapName;
     use mrol_service::replication::NodeName;
     use uuid::Uuid;
 
@@ -296,6 +297,36 @@ mod tests {
         assert!(wrong(&judged(1, Some("n0"), &[]))[0].contains("kept on 1 servers, not 3"));
         assert!(wrong(&judged(3, None, &[]))[0].contains("no leader"));
         assert!(wrong(&judged(3, Some("n0"), &["n2"]))[0].contains("not reached, on n2"));
+    }
+
+    #[test]
+    fn each_holder_has_a_copy_that_follows_the_log_and_one_leads() {
+        let of_a_and = |other: &str, head: MapHead| {
+            let (mut a, mut b) = (node("a", 5, 5 << 30, true), node("b", 5, 5 << 30, false));
+            let copy = |node: &SeenNode, head| MapCopy { node: node.node.clone(), is_live: true, head };
+            let copies = vec![copy(&a, a.beat.maps[&Uuid::nil()]), copy(&b, head)];
+            for node in [&mut a, &mut b] {
+                node.beat.maps.clear();
+            }
+            let holders = Holders::Only(["a", other].map(|name| NodeName::new(name).unwrap()).into());
+            let name = MapName::new("yard").unwrap();
+            let map = SeenMap { name, uuid: Uuid::nil(), wished: None, holders, copies };
+            Overview { nodes: vec![a, b], maps: vec![map] }
+        };
+        let follows = node("b", 5, 0, false).beat.maps[&Uuid::nil()];
+        let found = |seen: &Overview| wrong(&copies_of_maps(seen)).join("; ");
+        assert_eq!(found(&of_a_and("b", follows)), "");
+        let unsure = found(&of_a_and("b", MapHead { agrees: false, ..follows }));
+        assert!(unsure.contains("node b cannot tell whether its copy, at revision 1,"), "{unsure}");
+        let parted = found(&of_a_and("b", MapHead { is_parted: true, agrees: false, ..follows }));
+        assert!(parted.contains("of node b has parted") && !parted.contains("cannot tell"), "{parted}");
+        let unknown = found(&of_a_and("c", follows));
+        assert!(unknown.contains("that nobody knows: c; `mrol cluster copies yard NODES`"), "{unknown}");
+        let mut seen = of_a_and("b", follows);
+        seen.maps[0].copies.remove(1);
+        assert!(found(&seen).contains("node b has no copy"), "{seen:?}");
+        seen.maps[0].copies.remove(0);
+        assert!(found(&seen).contains("led by no live node"), "{seen:?}");
     }
 
     #[test]
