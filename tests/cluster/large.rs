@@ -81,8 +81,8 @@ impl Sizes {
         (0..1_000 * self.lines * self.planes).filter_map(key).collect()
     }
 
-    /// Points in voxels of their own, each in another block, above all else. The map grows by those of [`PLACES`] scans:
-    /// later ones show the same again.
+    /// Points in voxels of their own, each in another block, above all else. The map grows by those of [`PLACES`]
+    /// scans: later ones show the same again.
     fn scan(&self, number: i32) -> ScanRequest {
         let center = |k: i32| ((f64::from(k) + 0.5) * RESOLUTION_M) as f32;
         let point = |i: i32| {

@@ -23,6 +23,7 @@ mod released;
 mod site;
 mod watches;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use mrol::map::MapName;
@@ -31,7 +32,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 use crate::faults::{FAULTS, Fault, Report};
-use crate::load::Load;
+use crate::load::{Load, Reads};
 use crate::site::{MapState, NODES, Site, WITHIN};
 
 /// Faults at random of the long form; 0 = each once, in order.
@@ -52,6 +53,8 @@ fn seed() -> u64 {
 
 /// A time without an acknowledgment that nodes are asked about.
 const LONG: Duration = Duration::from_secs(20);
+/// How long the long form reads before anything fails.
+const CALM: Duration = Duration::from_secs(20);
 /// The tests take the whole machine, one after the other.
 static TURN: Mutex<()> = Mutex::new(());
 
@@ -59,6 +62,9 @@ static TURN: Mutex<()> = Mutex::new(());
 fn no_acknowledged_change_is_lost_or_made_twice_whatever_fails() {
     let _turn = TURN.lock();
     let Some(mut site) = Site::start() else { return };
+    if rounds() > 0 {
+        read_without_faults(&site);
+    }
     let map = MapName::new("hall").unwrap();
     site.create(&map);
     let load = Load::begin(&site, &map);
@@ -88,12 +94,31 @@ fn no_acknowledged_change_is_lost_or_made_twice_whatever_fails() {
     let (scans, readers) = load.end(&site);
     check_equal(&site, &map, scans);
     report.print();
-    for (node, reads) in readers.iter().enumerate() {
-        let (failed, answered, slow) = reads.summary();
-        println!("reads at node {node}: {answered}, of which 99 % within {slow:?}; {} failed", failed.len());
+    for failed in print_reads(&readers) {
         assert!(failed.len() <= 5, "reads failed at a node that was up: {failed:#?}");
     }
     println!("{scans} scans, each once");
+}
+
+/// Says how long reads take under the same load while nothing fails.
+fn read_without_faults(site: &Site) {
+    let map = MapName::new("calm").unwrap();
+    site.create(&map);
+    let load = Load::begin(site, &map);
+    std::thread::sleep(CALM);
+    println!("without faults, {} s:", CALM.as_secs());
+    print_reads(&load.end(site).1);
+}
+
+/// Says how long reads took; what failed, node by node.
+fn print_reads(readers: &[Arc<Reads>]) -> Vec<Vec<String>> {
+    let mut all_failed = Vec::new();
+    for (node, reads) in readers.iter().enumerate() {
+        let (failed, answered, slow) = reads.summary();
+        println!("reads at node {node}: {answered}, of which 99 % within {slow:?}; {} failed", failed.len());
+        all_failed.push(failed);
+    }
+    all_failed
 }
 
 /// All nodes are at one revision with one content, and every scan that was acknowledged is there once.
