@@ -166,7 +166,7 @@ impl MultiResolutionMap {
 
     /// Fills an empty map; false once stopped.
     fn fill_until(&self, contents: MapContents, stop: StopSignal<'_>) -> bool {
-        let Some(hash) = self.committer().add(&contents.voxels, &contents.moments, stop) else {
+        let Some(hash) = self.committer().add(contents.voxels, contents.moments, stop) else {
             return false;
         };
         *self.trajectory.write() = contents.trajectory;

@@ -126,16 +126,20 @@ impl<'a> Committer<'a> {
     }
 
     /// Adds finest voxels and moments, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins
-    /// with. The hash of the voxels; none once stopped: the map is of no use then.
+    /// with. The hash of the voxels; none once stopped: the map is of no use then. The sets go as soon as they were
+    /// taken apart, so that they are not in memory beside what is made of them.
     pub(in crate::map) fn add(
         self,
-        voxels: &VoxelSet,
-        moments: &MomentSet,
+        voxels: VoxelSet,
+        moments: MomentSet,
         stop: StopSignal<'_>,
     ) -> Option<ContentHash> {
-        let update = self.plan(&VoxelSet::default(), voxels, stop)?;
+        let update = self.plan(&VoxelSet::default(), &voxels, stop)?;
+        drop(voxels);
         let hash = update.added.hash;
-        self.carry_out(update, self.adding(moments), stop)?;
+        let gained = self.adding(&moments);
+        drop(moments);
+        self.carry_out(update, gained, stop)?;
         Some(hash)
     }
 
