@@ -1,6 +1,7 @@
 //! All servers of NATS are lost with their disks: the nodes have the maps.
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -24,13 +25,28 @@ fn wait_for(site: &Site, node: usize, map: &MapName, scans: usize) {
     }
 }
 
+/// Takes the maps of a folder into a new NATS; what was printed, and what went wrong.
+fn adopt_folder(site: &Site, folder: &Path) -> Result<String, String> {
+    let mut command = Command::new(program());
+    command.args(["cluster", "adopt", folder.to_str().unwrap(), "--of-node"]);
+    let output = command.args(["--nats", &site.nats.urls().join(",")]).output().unwrap();
+    match output.status.success() {
+        true => Ok(String::from_utf8(output.stdout).unwrap()),
+        false => Err(String::from_utf8(output.stderr).unwrap()),
+    }
+}
+
 /// Takes the maps of a node's folder into a new NATS; what was printed.
 fn adopt(site: &Site, node: usize) -> String {
-    let mut command = Command::new(program());
-    command.args(["cluster", "adopt", site.data(node).to_str().unwrap(), "--of-node"]);
-    let output = command.args(["--nats", &site.nats.urls().join(",")]).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    adopt_folder(site, &site.data(node)).unwrap()
+}
+
+/// All servers of NATS lose their disks.
+fn lose_nats(site: &mut Site) {
+    site.nats.kill_all();
+    (0..NODES).for_each(|server| fs::remove_dir_all(site.nats.store(server)).unwrap());
+    site.nats.start_all();
+    drop(site.nats.engine());
 }
 
 #[test]
@@ -55,10 +71,7 @@ fn where_all_of_nats_is_lost_the_furthest_copy_of_each_map_is_taken_into_a_new_o
     }
     (0..NODES).for_each(|node| site.kill_node(node));
     site.mend(behind);
-    site.nats.kill_all();
-    (0..NODES).for_each(|server| fs::remove_dir_all(site.nats.store(server)).unwrap());
-    site.nats.start_all();
-    drop(site.nats.engine());
+    lose_nats(&mut site);
 
     // In any order.
     let last = (behind + 2) % NODES;
@@ -78,4 +91,31 @@ fn where_all_of_nats_is_lost_the_furthest_copy_of_each_map_is_taken_into_a_new_o
         let states: Vec<_> = (0..NODES).map(|node| site.state(node, map)).collect();
         assert!(states.iter().all(|state| *state == states[0]), "{states:?}");
     }
+}
+
+#[test]
+fn a_further_copy_is_not_taken_under_a_node_that_was_started_and_a_folder_of_no_node_is_none() {
+    let Some(mut site) = Site::start() else { return };
+    let map = MapName::new("hall").unwrap();
+    site.create(&map);
+    (0..3).for_each(|number| insert(&site, &site.all_grpc(0), &map, number));
+    (0..NODES).for_each(|node| wait_for(&site, node, &map, 3));
+    let behind = (site.leader(&map) + 1) % NODES;
+    site.cut_off(behind);
+    let further = (0..NODES).find(|node| *node != behind).unwrap();
+    insert(&site, &site.grpc(further), &map, 3);
+    (0..NODES).for_each(|node| site.kill_node(node));
+    site.mend(behind);
+    lose_nats(&mut site);
+
+    assert!(adopt(&site, behind).contains("now, at revision 3:"));
+    site.start_node(behind);
+    site.wait_until_ready(behind);
+    let refused = adopt_folder(&site, &site.data(further)).unwrap_err();
+    assert!(refused.contains("was started with an older copy: end all nodes"), "{refused}");
+
+    let alone = site.data(0).with_file_name("alone");
+    fs::create_dir_all(alone.join("maps")).unwrap();
+    let refused = adopt_folder(&site, &alone).unwrap_err();
+    assert!(refused.contains("belongs to no node of a cluster: adopt it without --of-node"), "{refused}");
 }

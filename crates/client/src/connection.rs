@@ -161,6 +161,12 @@ impl Address {
         Self { endpoint: endpoint.keep_alive_timeout(KEEPALIVE_TIMEOUT), ..self }
     }
 
+    /// The same, for many watches of which each may stand still without keeping room from others.
+    pub(super) fn with_windows_of_watches(self) -> Self {
+        let endpoint = self.endpoint.initial_stream_window_size(transport::WATCH_WINDOW_BYTES);
+        Self { endpoint: endpoint.initial_connection_window_size(transport::WATCHES_WINDOW_BYTES), ..self }
+    }
+
     /// A channel that connects when it is used. It must be called in a runtime.
     pub(super) fn lazy_channel(&self) -> Channel {
         self.endpoint.connect_lazy()

@@ -56,7 +56,7 @@ pub use error::ClientError;
 pub use mrol_map::{align, bloom, geometry, map, mapping, planning, scan, util, visibility, voxel};
 pub use mrol_service as service;
 pub use new_map::{NewFilter, NewMap};
-pub use node_client::NodeClient;
+pub use node_client::{ConnectionUse, NodeClient};
 pub use replica::{
     BLOCKS_MAX_DEFAULT, Replica, ReplicaError, ReplicaOptions, ReplicaStatus, VIEWPOINT_BYTES_MAX_DEFAULT,
 };

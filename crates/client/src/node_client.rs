@@ -23,6 +23,15 @@ pub struct NodeClient {
     node: NodeName,
 }
 
+/// What a connection to another node is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ConnectionUse {
+    /// Calls that are answered once, and read at once.
+    Calls,
+    /// Watches, each of which may stand still: none of them takes the room of others.
+    Watches,
+}
+
 impl NodeClient {
     /// Connects to the gRPC address of another node within `timeout`, as the node `own`.
     ///
@@ -32,9 +41,14 @@ impl NodeClient {
         url: &str,
         credentials: &Credentials,
         own: NodeName,
+        use_of: ConnectionUse,
         timeout: Duration,
     ) -> Result<Self, ClientError> {
         let address = Address::parse(url, credentials)?.with_keepalive();
+        let address = match use_of {
+            ConnectionUse::Calls => address,
+            ConnectionUse::Watches => address.with_windows_of_watches(),
+        };
         let connection = address.connect(credentials, timeout).await?.replaceable();
         Ok(Self { connection, node: own })
     }

@@ -128,8 +128,11 @@ fn chosen(
     if let Some(missing) = named.iter().find(|name| !there.contains(name)) {
         return Err(CliError::failed(format!("--map: there is no map {missing} in the data folder")));
     }
-    let is_former = |name: &MapName| of_node && !named.contains(name) && name.as_str().contains("-replaced-");
-    Ok(there.into_iter().filter(is_meant).partition(|name| !is_former(name)))
+    let is_former = |name: &MapName| {
+        let of = name.as_str().rsplit_once("-replaced-").map(|(of, _)| of);
+        of_node && !named.contains(name) && of.is_some_and(|of| there.iter().any(|map| map.as_str() == of))
+    };
+    Ok(there.clone().into_iter().filter(is_meant).partition(|name| !is_former(name)))
 }
 
 /// Refuses maps whose names others have in the cluster, before anything is put.

@@ -101,10 +101,17 @@ impl Report {
                  (`mrol cluster copies`)"
             ))
         });
+        // Where no node is heard of, who leads is not known.
+        let seconds = OverviewReader::SILENT_AFTER.as_secs();
+        let nobody = format!(
+            "NO NODE was heard of for {seconds} s: they are down, or NATS takes no beats in time; who leads is not known"
+        );
+        let is_heard = self.nodes.iter().any(|node| node.live);
+        let nobody = (!is_heard && !self.nodes.is_empty()).then_some(nobody);
         let maps = self.maps.iter().flat_map(|map| {
             let name = &map.map;
             let unsure_first = map.copies.iter().find(|copy| copy.unsure && copy.live && copy.lag == 0);
-            let unled = map.leader.is_none().then(|| match unsure_first {
+            let unled = (is_heard && map.leader.is_none()).then(|| match unsure_first {
                 Some(copy) => format!(
                     "NO NODE LEADS map {name}: it takes no changes, since node {} is the furthest and cannot tell",
                     copy.node
@@ -131,7 +138,7 @@ impl Report {
             });
             unled.into_iter().chain(parted).chain(unsure)
         });
-        none.into_iter().chain(silent).chain(full).chain(maps).collect()
+        none.into_iter().chain(nobody).chain(silent).chain(full).chain(maps).collect()
     }
 }
 

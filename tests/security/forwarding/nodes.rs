@@ -12,7 +12,7 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioExecutor, TokioIo};
 use mrol::access::{Access, Gate, Secret};
 use mrol::admission::{Admission, Lifecycle};
-use mrol::client::{Client, Credentials, NodeClient};
+use mrol::client::{Client, ConnectionUse, Credentials, NodeClient};
 use mrol::map::{CallerName, MapName, MapSettings};
 use mrol::middleware::Middleware;
 use mrol::service::replication::NodeName;
@@ -122,7 +122,10 @@ impl Node {
     /// A client that says that it is node `c`, which asks for the holder of a key.
     pub(super) async fn client_of_node(&self, key: Option<&Secret>, caller: Option<&str>) -> Client {
         let c = NodeName::new("c").unwrap();
-        let client = NodeClient::connect(&self.address(), &credentials(key), c, PATIENCE).await.unwrap();
+        let client =
+            NodeClient::connect(&self.address(), &credentials(key), c, ConnectionUse::Calls, PATIENCE)
+                .await
+                .unwrap();
         let caller = caller.map(|caller| CallerName::new(caller).unwrap());
         client.on_behalf_of(caller.as_ref()).with_timeout(PATIENCE)
     }

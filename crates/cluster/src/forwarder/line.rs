@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use mrol_client::{ClientError, Credentials, NodeClient};
+use mrol_client::{ClientError, ConnectionUse, Credentials, NodeClient};
 use mrol_map::sync::{Mutex, Rank};
 use mrol_service::replication::NodeName;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -15,6 +15,7 @@ pub(super) const CALLS_MAX: usize = 100;
 /// One connection to another node, which is made when it is first needed and again once it is lost.
 #[derive(Debug)]
 pub(super) struct Line {
+    use_of: ConnectionUse,
     places: Arc<Semaphore>,
     connected: Mutex<Option<NodeClient>>,
     /// Held while a connection is made, with when making the last one failed, and why.
@@ -25,8 +26,9 @@ pub(super) struct Line {
 pub(super) type Place = OwnedSemaphorePermit;
 
 impl Line {
-    pub(super) fn new() -> Self {
+    pub(super) fn of(use_of: ConnectionUse) -> Self {
         Self {
+            use_of,
             places: Arc::new(Semaphore::new(CALLS_MAX)),
             connected: Mutex::new(Rank::Brief, None),
             connecting: tokio::sync::Mutex::const_new(None),
@@ -73,7 +75,7 @@ impl Line {
             Some((at, error)) if *at >= asked => return Err(error.clone()),
             _ => {}
         }
-        let connected = NodeClient::connect(address, credentials, own.clone(), timeout).await;
+        let connected = NodeClient::connect(address, credentials, own.clone(), self.use_of, timeout).await;
         match &connected {
             Ok(client) => *self.connected.lock() = Some(client.clone()),
             Err(error) => *failed = Some((Instant::now(), error.clone())),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mrol_client::ConnectionUse;
 use mrol_map::sync::{Mutex, Rank};
 
 use super::line::{Line, Place};
@@ -19,7 +20,7 @@ pub(super) struct Peer {
 
 impl Peer {
     pub(super) fn at(address: String) -> Self {
-        Self { address, calls: Line::new(), watches: Mutex::new(Rank::Brief, Vec::new()) }
+        Self { address, calls: Line::of(ConnectionUse::Calls), watches: Mutex::new(Rank::Brief, Vec::new()) }
     }
 
     /// A connection for a watch, with the place on it.
@@ -29,7 +30,7 @@ impl Peer {
         if let Some(found) = lines.iter().find_map(|line| Some((Arc::clone(line), line.free_place()?))) {
             return Some(found);
         }
-        let line = Arc::new(Line::new());
+        let line = Arc::new(Line::of(ConnectionUse::Watches));
         let place = line.free_place()?;
         lines.push(Arc::clone(&line));
         Some((line, place))

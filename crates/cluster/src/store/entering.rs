@@ -44,7 +44,8 @@ impl ClusterStore {
     }
 
     /// Puts a further copy of a map in the place of the one that its log begins with, while no node has begun with
-    /// that: the log is empty. Says the revision of the one that was there before. Not for an async thread.
+    /// that: none was ever started with this NATS. Says the revision of the one that was there before. Not for an async
+    /// thread.
     ///
     /// # Errors
     /// Says why the copy was not put.
@@ -56,17 +57,24 @@ impl ClusterStore {
             return Ok(before.revision);
         }
         let log = JetStreamLog::open(&self.engine, *uuid).map_err(|error| failed(&error))?;
-        let check_unused = || match log.used().map_err(|error| failed(&error))?.last_sequence {
-            0 => Ok(()),
-            _ => {
-                Err(failed(&"a node has begun with an older copy: end all nodes, and begin with a new NATS"))
+        let check_unused = || {
+            let why = |begun: String| failed(&format!("{begun}: end all nodes, and begin with a new NATS"));
+            if let Some(beat) = self.beats.read().map_err(|error| failed(&error))?.first() {
+                return Err(why(format!("node {} was started with an older copy", beat.node)));
+            }
+            match log.used().map_err(|error| failed(&error))?.last_sequence {
+                0 => Ok(()),
+                _ => Err(why("a node has begun with an older copy".to_owned())),
             }
         };
         check_unused()?;
         self.bases.put(*uuid, base, file).map_err(|error| failed(&error))?;
-        // A node may have been started meanwhile.
-        check_unused()?;
-        self.pointers.change(*uuid, base, revision).map_err(|error| failed(&error))?;
+        let changed = self.pointers.change(*uuid, base, revision).map_err(|error| failed(&error))?;
+        // A node that was started meanwhile beats before it claims, and looks where the log begins before it leads.
+        if let Err(error) = check_unused() {
+            self.pointers.change(*uuid, &before, changed).map_err(|error| failed(&error))?;
+            return Err(error);
+        }
         if let Err(error) = self.bases.delete(*uuid, &before) {
             tracing::debug!(%error, "the copy that was there before is still there");
         }

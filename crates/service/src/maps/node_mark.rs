@@ -11,6 +11,9 @@ use mrol_store::DataDir;
 pub(super) fn check_node(data_dir: &DataDir, settings: &ServiceSettings) -> Result<(), ServiceError> {
     let there = data_dir.node().map_err(not_stored)?;
     let message = match (settings.cluster.as_ref(), there.as_deref()) {
+        (None, None) if settings.adoption == Some(Adoption::OfNode) => {
+            "the data folder belongs to no node of a cluster: adopt it without --of-node".to_owned()
+        }
         (None, None) => return Ok(()),
         (Some(Cluster { node, .. }), None | Some("")) => {
             return data_dir.set_node(node.as_str()).map_err(not_stored);

@@ -108,6 +108,14 @@ impl Member {
         &self.reading.base
     }
 
+    /// Where readers of the log begin now.
+    ///
+    /// # Errors
+    /// Where that cannot be found out.
+    pub(crate) fn base_now(&self) -> Result<Base, LogError> {
+        self.log.base()
+    }
+
     /// Where others can begin to read, with a copy of this node's map at `revision`, of which all that a copy may hold
     /// has the hash `state`, made by a record with the checksum; none where that would be in the middle of a change, or
     /// where the log is not at this revision.

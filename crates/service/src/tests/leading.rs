@@ -4,6 +4,7 @@ use super::two_nodes::{TwoNodes, scan_of};
 use crate::cluster::NoRoom;
 use crate::commit::Lead;
 use crate::error::Reason;
+use crate::replication::Base;
 use crate::request::{Deletion, DeletionTarget, ScanRequest};
 use mrol_map::geometry::Point;
 
@@ -51,6 +52,21 @@ async fn a_claim_changes_nothing_before_the_others_are_known_to_have_no_more() {
     assert_eq!(too_late.reason, Reason::NotLeader, "{too_late}");
     nodes.a.lead(&nodes.map).await;
     assert!(nodes.a.service.insert_scan(&nodes.map, scan_of("r", 0.05)).await.unwrap().accepted);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_does_not_lead_where_the_log_begins_at_a_revision_that_it_has_not() {
+    let nodes = TwoNodes::begin().await;
+    nodes.a.service.claim_map(&nodes.map, None).await.unwrap();
+    // A copy that is further was made the base after this node had begun.
+    let further = Base { revision: 5, ..nodes.log.0.lock().base().clone() };
+    nodes.log.0.lock().cut(further);
+    let claim = nodes.a.claim_of(&nodes.map).await;
+    let refused = nodes.a.service.open_map(&nodes.map, claim, Vec::new()).await.unwrap_err();
+    assert_eq!(refused.reason, Reason::HistoriesDiffer, "{refused}");
+    assert!(refused.message.contains("it is at revision 0, and the log begins at 5"), "{refused}");
+    let refused = nodes.a.service.insert_scan(&nodes.map, scan_of("r", 0.05)).await.unwrap_err();
+    assert_ne!(refused.reason, Reason::OutcomeUnknown, "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -27,6 +27,7 @@ pub(super) struct TwoNodes {
     pub(super) a: Node,
     pub(super) b: Node,
     pub(super) map: MapName,
+    pub(super) log: NodeLog,
 }
 
 /// A node: its service, and how it asks the other.
@@ -70,7 +71,7 @@ impl TwoNodes {
             let (log, name) = (Arc::new(log.clone()), node.name.clone());
             node.service.share_map(&map, log, name).await.unwrap();
         }
-        Self { a, b, map }
+        Self { a, b, map, log }
     }
 
     /// The same, where `a` leads and `b` knows.

@@ -61,6 +61,9 @@ impl Worker {
         if !member.agrees() {
             return Err(self.cannot_tell(member.head()));
         }
+        // A copy that is further may have been made the base since this node began: what it has was acknowledged.
+        let base = member.base_now().map_err(|error| no_quorum(&self.name, &error.to_string()))?;
+        self.check_has(base.revision)?;
         self.give_back()?;
         if let Some(member) = &mut self.member {
             member.open();

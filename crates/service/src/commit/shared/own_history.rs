@@ -18,12 +18,8 @@ impl Worker {
     /// Compares where the log begins with what this node has.
     pub(super) fn compare_base(&mut self) -> Result<(), ServiceError> {
         let Some(base) = self.member.as_ref().map(|member| member.base().clone()) else { return Ok(()) };
-        let (own, revision) = (self.map.revision(), base.revision);
-        if own < revision {
-            let how = format!("it is at revision {own}, and the log begins at {revision}");
-            tracing::warn!(map = %self.name, how, "this node's copy is behind where the log begins");
-            return Err(self.stopped.get_or_init(|| Stop::Behind(how)).refusal(&self.name));
-        }
+        let revision = base.revision;
+        self.check_has(revision)?;
         let state = self.published.recent.hashes_at(revision).map(|hashes| hashes.state);
         let by_state = state.zip(base.state).map(|(ours, theirs)| ours == theirs);
         let by_record = self.checksum_at(revision).zip(base.checksum).map(|(ours, theirs)| ours == theirs);
@@ -35,6 +31,17 @@ impl Worker {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Refuses where the log begins at a revision that this node has not made.
+    pub(super) fn check_has(&self, revision: u64) -> Result<(), ServiceError> {
+        let own = self.map.revision();
+        if own >= revision {
+            return Ok(());
+        }
+        let how = format!("it is at revision {own}, and the log begins at {revision}");
+        tracing::warn!(map = %self.name, how, "this node's copy is behind where the log begins");
+        Err(self.stopped.get_or_init(|| Stop::Behind(how)).refusal(&self.name))
     }
 
     /// Where another node can begin to read the log, with a copy of this map.
