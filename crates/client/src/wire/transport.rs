@@ -10,8 +10,8 @@ pub const MESSAGE_BYTES_MAX: usize = Limits::MESSAGE_BYTES_MAX;
 pub const STREAM_WINDOW_BYTES: u32 = 4 << 20;
 /// Bytes of all streams of a connection that may be under way unacknowledged.
 pub const CONNECTION_WINDOW_BYTES: u32 = 16 << 20;
-/// The same of a stream where many watches share a connection: a reader that stands still keeps what one stream may have
-/// under way, and never what others need.
+/// The same of a stream where many watches share a connection: a reader that stands still keeps what one stream may
+/// have under way, and never what others need.
 pub const WATCH_WINDOW_BYTES: u32 = 64 << 10;
 /// Bytes of all watches of such a connection: room for each of so many as a server takes.
 pub const WATCHES_WINDOW_BYTES: u32 = 128 * WATCH_WINDOW_BYTES;
