@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use crate::nats::eventually;
+
 /// How often a connection looks whether it is cut.
 const LOOKED_EVERY: Duration = Duration::from_millis(20);
 
@@ -35,9 +37,9 @@ impl Link {
         Self::between(0, target)
     }
 
-    /// From one port of this machine to another.
+    /// From one port of this machine to another. A port that was free a moment ago may still be let go of.
     pub(crate) fn between(port: u16, target: u16) -> Self {
-        let listener = TcpListener::bind(("127.0.0.1", port)).unwrap();
+        let listener = eventually(|| TcpListener::bind(("127.0.0.1", port)));
         let port = listener.local_addr().unwrap().port();
         let state = Arc::<State>::default();
         let of_all = Arc::clone(&state);
