@@ -19,13 +19,18 @@ const OF_A_CLIENT: usize = 75;
 /// Events of scans that are refused, some kilobytes each: more than a connection has room for.
 const EVENTS: u64 = 3_000;
 
-#[test]
-fn watches_that_stand_still_at_a_follower_keep_no_event_from_others() {
-    let settings = &[("MROL_LIMITS__CALLER_WATCHES_MAX", "200")];
-    let Some(site) = Site::start_with(settings) else { return };
+/// A site that takes enough watches, with a map.
+fn begin() -> Option<(Site, MapName)> {
+    let site = Site::start_with(&[("MROL_LIMITS__CALLER_WATCHES_MAX", "200")])?;
     let map = MapName::new("hall").unwrap();
     site.create(&map);
     site.insert(&site.all_grpc(0), &map, 1, Point::new(1.0, 0.0, 0.0));
+    Some((site, map))
+}
+
+#[test]
+fn watches_that_stand_still_at_a_follower_keep_no_event_from_others() {
+    let Some((site, map)) = begin() else { return };
     let leader = site.leader(&map);
     let follower = site.client(&site.grpc((leader + 1) % NODES));
     let still = site.client(&site.grpc((leader + 1) % NODES));
@@ -57,11 +62,7 @@ fn watches_that_stand_still_at_a_follower_keep_no_event_from_others() {
 
 #[test]
 fn whoever_watches_at_a_follower_keeps_no_change_from_the_leader() {
-    let settings = &[("MROL_LIMITS__CALLER_WATCHES_MAX", "200")];
-    let Some(site) = Site::start_with(settings) else { return };
-    let map = MapName::new("hall").unwrap();
-    site.create(&map);
-    site.insert(&site.all_grpc(0), &map, 1, Point::new(1.0, 0.0, 0.0));
+    let Some((site, map)) = begin() else { return };
     let follower = (site.leader(&map) + 1) % NODES;
     let mut watches = Vec::new();
     for _ in 0..WATCHES / OF_A_CLIENT {

@@ -41,11 +41,11 @@ impl NodeClient {
         url: &str,
         credentials: &Credentials,
         own: NodeName,
-        use_of: ConnectionUse,
+        usage: ConnectionUse,
         timeout: Duration,
     ) -> Result<Self, ClientError> {
         let address = Address::parse(url, credentials)?.with_keepalive();
-        let address = match use_of {
+        let address = match usage {
             ConnectionUse::Calls => address,
             ConnectionUse::Watches => address.with_windows_of_watches(),
         };

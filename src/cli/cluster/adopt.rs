@@ -132,7 +132,7 @@ fn chosen(
         let of = name.as_str().rsplit_once("-replaced-").map(|(of, _)| of);
         of_node && !named.contains(name) && of.is_some_and(|of| there.iter().any(|map| map.as_str() == of))
     };
-    Ok(there.clone().into_iter().filter(is_meant).partition(|name| !is_former(name)))
+    Ok(there.iter().filter(|name| is_meant(name)).cloned().partition(|name| !is_former(name)))
 }
 
 /// Refuses maps whose names others have in the cluster, before anything is put.

@@ -86,6 +86,12 @@ impl Report {
         Self { nodes, maps: seen.maps.iter().map(MapRow::of).collect() }
     }
 
+    /// True where no node is live, and one did not say that it ends: it may be up, and NATS take no beats.
+    fn is_silent(&self) -> bool {
+        let mut nodes = self.nodes.iter();
+        nodes.any(|node| !node.ended) && self.nodes.iter().all(|node| !node.live)
+    }
+
     /// What somebody should look at.
     fn warnings(&self) -> Vec<String> {
         let none = "no node has ever beaten: start one with `mrol serve --cluster`".to_owned();
@@ -101,17 +107,17 @@ impl Report {
                  (`mrol cluster copies`)"
             ))
         });
-        // Where no node is heard of, who leads is not known.
+        let is_silent = self.is_silent();
         let seconds = OverviewReader::SILENT_AFTER.as_secs();
-        let nobody = format!(
-            "NO NODE was heard of for {seconds} s: they are down, or NATS takes no beats in time; who leads is not known"
-        );
-        let is_heard = self.nodes.iter().any(|node| node.live);
-        let nobody = (!is_heard && !self.nodes.is_empty()).then_some(nobody);
+        let nobody = is_silent.then(|| {
+            format!(
+                "NO NODE was heard of for {seconds} s: they are down, or NATS takes no beats in time; who leads is not known"
+            )
+        });
         let maps = self.maps.iter().flat_map(|map| {
             let name = &map.map;
             let unsure_first = map.copies.iter().find(|copy| copy.unsure && copy.live && copy.lag == 0);
-            let unled = (is_heard && map.leader.is_none()).then(|| match unsure_first {
+            let unled = (!is_silent && map.leader.is_none()).then(|| match unsure_first {
                 Some(copy) => format!(
                     "NO NODE LEADS map {name}: it takes no changes, since node {} is the furthest and cannot tell",
                     copy.node
@@ -297,5 +303,10 @@ mod tests {
             (&json["maps"][0]["copies"][1]["lag"], &json["maps"][1]["leader"]),
             (&2.into(), &().into())
         );
+        let of_nodes = |nodes| Report { nodes, maps: vec![map("yard", None, vec![copy("b", 7, 0)])] };
+        let silent = of_nodes(vec![node("b", false), node("d", false)]).warnings().join("; ");
+        assert!(silent.contains("who leads is not known") && !silent.contains("NO NODE LEADS"), "{silent}");
+        let ended = of_nodes(vec![node("d", false)]).warnings().join("; ");
+        assert!(ended.contains("NO NODE LEADS map yard") && !ended.contains("is not known"), "{ended}");
     }
 }

@@ -15,7 +15,7 @@ pub(super) const CALLS_MAX: usize = 100;
 /// One connection to another node, which is made when it is first needed and again once it is lost.
 #[derive(Debug)]
 pub(super) struct Line {
-    use_of: ConnectionUse,
+    usage: ConnectionUse,
     places: Arc<Semaphore>,
     connected: Mutex<Option<NodeClient>>,
     /// Held while a connection is made, with when making the last one failed, and why.
@@ -26,9 +26,9 @@ pub(super) struct Line {
 pub(super) type Place = OwnedSemaphorePermit;
 
 impl Line {
-    pub(super) fn of(use_of: ConnectionUse) -> Self {
+    pub(super) fn of(usage: ConnectionUse) -> Self {
         Self {
-            use_of,
+            usage,
             places: Arc::new(Semaphore::new(CALLS_MAX)),
             connected: Mutex::new(Rank::Brief, None),
             connecting: tokio::sync::Mutex::const_new(None),
@@ -75,7 +75,7 @@ impl Line {
             Some((at, error)) if *at >= asked => return Err(error.clone()),
             _ => {}
         }
-        let connected = NodeClient::connect(address, credentials, own.clone(), self.use_of, timeout).await;
+        let connected = NodeClient::connect(address, credentials, own.clone(), self.usage, timeout).await;
         match &connected {
             Ok(client) => *self.connected.lock() = Some(client.clone()),
             Err(error) => *failed = Some((Instant::now(), error.clone())),
