@@ -7,10 +7,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crate::nats::eventually;
-
 /// How often a connection looks whether it is cut.
 const LOOKED_EVERY: Duration = Duration::from_millis(20);
+
+/// How often it tries to listen at its port, and the pause between.
+const BINDS_MAX: usize = 50;
+const BOUND_EVERY: Duration = Duration::from_millis(100);
 
 /// How often it takes connections.
 const ACCEPTED_EVERY: Duration = Duration::from_millis(5);
@@ -39,7 +41,11 @@ impl Link {
 
     /// From one port of this machine to another. A port that was free a moment ago may still be let go of.
     pub(crate) fn between(port: u16, target: u16) -> Self {
-        let listener = eventually(|| TcpListener::bind(("127.0.0.1", port)));
+        let listener = (0..BINDS_MAX).find_map(|_| {
+            let bound = TcpListener::bind(("127.0.0.1", port));
+            bound.inspect_err(|_| thread::sleep(BOUND_EVERY)).ok()
+        });
+        let listener = listener.expect("the port is not let go of");
         let port = listener.local_addr().unwrap().port();
         let state = Arc::<State>::default();
         let of_all = Arc::clone(&state);

@@ -5,4 +5,4 @@ mod servers;
 #[path = "../../../crates/cluster/tests/jetstream/support/skipped.rs"]
 pub(crate) mod skipped;
 
-pub(crate) use servers::{NatsServers, copy_folder, eventually, free_ports};
+pub(crate) use servers::{NatsServers, copy_folder, free_ports};
