@@ -27,14 +27,14 @@ FIRING = {"MrolMapUnavailable", "MrolCertificateExpires"}
 OF_NODES = re.compile(r"mrol_(node|cluster)_|mrol_map_(leads|epoch|lag_revisions|parted)")
 
 
-def main(binary, folder):
+def main(binary, folder, binary_of_node):
     panels, variables = panels_of_dashboard()
     rules = (DOCKER / "prometheus/rules.yml").read_text()
     check_rules_are_tested(rules)
     nats = os.environ.get("NATS_SERVER_PROGRAM")
     with (
         server_under_load(binary, folder) as (server, load),
-        node_of_a_cluster(binary, nats, server) if nats else nullcontext() as node,
+        node_of_a_cluster(binary_of_node, nats, server) if nats else nullcontext() as node,
         prometheus(server, node, Path(folder)) as ask,
     ):
         asked = [(f"panel {panel}", *target) for panel, targets in panels.items() for target in targets]

@@ -4,14 +4,12 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-#[cfg(feature = "cluster")]
-use super::cluster;
 #[cfg(feature = "logs")]
 use super::log;
 use super::{
-    block, check, classify, completions, config, delete, doctor, events, export, frontiers, grid, health,
-    import, insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays, snapshot,
-    undo, watch,
+    block, check, classify, cluster, completions, config, delete, doctor, events, export, frontiers, grid,
+    health, import, insert, keepout, key, lab, localize, man, map, maps, nearest, observers, query, rays,
+    snapshot, undo, watch,
 };
 use crate::demo::Demo;
 use mrol::build_info;
@@ -69,7 +67,6 @@ enum Command {
     Keepout(keepout::KeepOuts),
     Watch(watch::Watch),
     Maps(maps::Maps),
-    #[cfg(feature = "cluster")]
     Cluster(cluster::Cluster),
     Health(health::Health),
     Key(key::Keys),
@@ -125,7 +122,6 @@ impl Command {
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Keepout(keepout) => runtime::block_on(keepout.run(output)),
             Self::Watch(watch) => runtime::block_on(watch.run(output)),
-            #[cfg(feature = "cluster")]
             Self::Cluster(cluster) => cluster.run(output),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
             Self::Health(health) => runtime::block_on(health.run(output)),

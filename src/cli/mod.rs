@@ -10,6 +10,9 @@ mod check;
 mod classify;
 #[cfg(feature = "cluster")]
 mod cluster;
+#[cfg(not(feature = "cluster"))]
+#[path = "no_cluster.rs"]
+mod cluster;
 mod command_line;
 mod completions;
 mod config;

@@ -19,8 +19,8 @@ pub enum ServerError {
     Open(ServiceError),
     /// The program was built without clusters.
     #[error(
-        "this program was built without clusters (cluster.nats is set): build it with the feature `cluster`, which \
-         released programs have"
+        "this program was built without clusters, which `cluster.nats` and `mrol cluster` take: build it by \
+         `cargo build --release --bin mrol --features cluster`; released programs and the container have them"
     )]
     NoClusters,
     /// The secret of the cluster cannot be read.
