@@ -18,6 +18,8 @@ use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, ScanRequest};
 use mrol::store::Snapshot;
 use mrol::voxel::{VoxelKey, VoxelSet};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use uuid::Uuid;
 
 use crate::load::Load;
@@ -81,17 +83,15 @@ impl Sizes {
         (0..1_000 * self.lines * self.planes).filter_map(key).collect()
     }
 
-    /// Points in voxels of their own, each in another block, above all else. The map grows by those of [`PLACES`]
-    /// scans: later ones show the same again.
+    /// Points in voxels of their own, each somewhere in another block, above all else: what lies in order takes no bytes of
+    /// a log. The map grows by those of [`PLACES`] scans: later ones show the same again.
     fn scan(&self, number: i32) -> ScanRequest {
         let center = |k: i32| ((f64::from(k) + 0.5) * RESOLUTION_M) as f32;
-        let point = |i: i32| {
-            Point::new(
-                center(APART * (i % 1_000)),
-                center(APART * (i / 1_000)),
-                center(1_700 + APART * (number % PLACES)),
-            )
-        };
+        let place = number % PLACES;
+        let mut random = ChaCha8Rng::seed_from_u64(place as u64);
+        let mut within = |block: i32| center(APART * block + random.random_range(0..APART));
+        let first = 1_700 / APART + 1;
+        let mut point = |i: i32| Point::new(within(i % 1_000), within(i / 1_000), within(first + place));
         let points: Vec<Point> = (0..self.points).map(point).collect();
         ScanRequest {
             scan_id: Some(number as u64),
