@@ -83,8 +83,8 @@ impl Sizes {
         (0..1_000 * self.lines * self.planes).filter_map(key).collect()
     }
 
-    /// Points in voxels of their own, each somewhere in another block, above all else: what lies in order takes no bytes of
-    /// a log. The map grows by those of [`PLACES`] scans: later ones show the same again.
+    /// Points in voxels of their own, each somewhere in another block, above all else: what lies in order takes no
+    /// bytes of a log. The map grows by those of [`PLACES`] scans: later ones show the same again.
     fn scan(&self, number: i32) -> ScanRequest {
         let center = |k: i32| ((f64::from(k) + 0.5) * RESOLUTION_M) as f32;
         let place = number % PLACES;
