@@ -91,7 +91,7 @@ impl Sizes {
         let mut random = ChaCha8Rng::seed_from_u64(place as u64);
         let mut within = |block: i32| center(APART * block + random.random_range(0..APART));
         let first = 1_700 / APART + 1;
-        let mut point = |i: i32| Point::new(within(i % 1_000), within(i / 1_000), within(first + place));
+        let point = |i: i32| Point::new(within(i % 1_000), within(i / 1_000), within(first + place));
         let points: Vec<Point> = (0..self.points).map(point).collect();
         ScanRequest {
             scan_id: Some(number as u64),
