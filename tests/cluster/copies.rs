@@ -148,6 +148,6 @@ fn clients_go_on_to_the_nodes_that_hold_a_map() {
         assert_eq!(site.state(node, &map), Some(state), "a client of node {node}");
     }
     // A map is deleted by way of any node.
-    site.runtime().block_on(site.client(&site.grpc(led)).delete_map(&map)).unwrap();
+    site.delete(led, &map);
     (0..NODES).for_each(|node| wait_for_status(&site, node, &map, 404));
 }

@@ -117,8 +117,7 @@ fn released_data_folders_are_adopted_by_a_cluster_and_leave_it_again() {
         let here = site.state(0, &office()).unwrap();
         assert_eq!((here.revision, here.voxels), (revision, voxels), "and so does the cluster");
 
-        let client = site.client(&site.grpc(0));
-        site.runtime().block_on(client.delete_map(&office())).unwrap();
+        site.delete(0, &office());
         wait_for(&site, 1, "it is deleted", |there| there.is_none());
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use mrol::client::{Client, NewMap};
+use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{ContentHash, MapName, RobotName};
 use mrol::mapping::Guess;
@@ -225,7 +225,28 @@ impl Site {
     pub(crate) fn create(&self, map: &MapName) {
         let client = self.client(&self.all_grpc(0));
         let settings = NewMap { levels: Some(2), ..NewMap::of(0.5) };
-        self.runtime.block_on(client.create_map(map, settings)).unwrap();
+        self.answered(async || client.create_map(map, settings).await);
+    }
+
+    /// Deletes a map by way of a node.
+    pub(crate) fn delete(&self, index: usize, map: &MapName) {
+        let client = self.client(&self.grpc(index));
+        self.answered(async || client.delete_map(map).await);
+    }
+
+    /// Asks again while NATS is late: such a refusal says that nothing was changed.
+    fn answered<T>(&self, ask: impl AsyncFn() -> Result<T, ClientError>) -> T {
+        let begun = Instant::now();
+        loop {
+            match self.runtime.block_on(ask()) {
+                Ok(answer) => return answer,
+                Err(error) => {
+                    let is_late = error.reason().is_some_and(|it| ["no_quorum", "not_leader"].contains(&it));
+                    assert!(is_late && begun.elapsed() < WITHIN, "{error}");
+                }
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
     }
 
     /// Puts one voxel more into a map, under a number, again until that is acknowledged; the revision that it makes.
