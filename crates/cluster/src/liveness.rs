@@ -6,7 +6,7 @@ use mrol_service::replication::NodeName;
 
 /// Own beats that were acknowledged since a node's last, after which it counts as gone: eight seconds. A halt of a
 /// second and a beat that was lost make nobody gone.
-const OWN_BEATS: u64 = 4;
+pub(crate) const OWN_BEATS: u64 = 4;
 
 /// The same, where the node's port refuses as well: nothing listens there, so its process is gone.
 const OWN_BEATS_IF_REFUSED: u64 = 1;

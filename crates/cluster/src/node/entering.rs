@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use super::blocking::{blocking, no_quorum, try_again};
 use super::keepers::Wish;
-use super::room::holders;
+use super::room::{holders, knows_others};
 use super::settings::NodeSettings;
 use super::view::{Seen, View};
 use crate::beats::BEAT_EVERY;
@@ -117,7 +117,7 @@ impl Entering {
             return Ok(Holders::All);
         }
         let mut view = self.view.clone();
-        let settled = timeout(SETTLED_WITHIN, view.wait_for(|view| view.is_settled)).await;
+        let settled = timeout(SETTLED_WITHIN, view.wait_for(|view| knows_others(self.copies, view))).await;
         match settled {
             Ok(Ok(view)) => Ok(holders(self.copies, &self.node, &view)),
             _ => Err(try_again("this node has not seen yet which of the others are live")),

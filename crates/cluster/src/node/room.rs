@@ -6,6 +6,7 @@ use mrol_service::replication::NodeName;
 
 use super::view::View;
 use crate::catalog::Holders;
+use crate::liveness::OWN_BEATS;
 
 /// The nodes that are to hold a map which is made at `own`: `copies` of them, all where that is 0. The first is `own`,
 /// the others are the live nodes with the most room on their disks; of equals, those with the fewest maps, and then the
@@ -20,6 +21,14 @@ pub(super) fn holders(copies: usize, own: &NodeName, view: &View) -> Holders {
     Holders::Only([own].into_iter().chain(others).cloned().collect())
 }
 
+/// True once a node knows of the others what it takes to choose `copies` holders of a map: which of those it heard of are
+/// live, and that no more will be heard of soon where they are fewer. A node that runs beats every two seconds, so whoever
+/// has beaten as often as it takes to count another as gone has heard of all that run.
+pub(super) fn knows_others(copies: usize, view: &View) -> bool {
+    let live = view.others.values().filter(|seen| seen.is_live).count();
+    view.is_settled && (live + 1 >= copies || view.beats >= OWN_BEATS)
+}
+
 #[cfg(test)]
 mod tests {
     use uuid::Uuid;
@@ -28,9 +37,12 @@ mod tests {
     use crate::beat::{Beat, MapHead};
     use crate::node::view::Seen;
 
-    /// What `own` holds a new map with, beside the others: name, whether it is live, bytes that are free, maps.
-    fn chosen(copies: usize, others: &[(&str, bool, u64, usize)]) -> String {
-        let name = |name: &str| NodeName::new(name).unwrap();
+    fn name(name: &str) -> NodeName {
+        NodeName::new(name).unwrap()
+    }
+
+    /// What a node sees of others: name, whether it is live, bytes that are free, maps.
+    fn view_of(others: &[(&str, bool, u64, usize)]) -> View {
         let head = MapHead {
             revision: 1,
             epoch: 1,
@@ -49,8 +61,22 @@ mod tests {
             };
             (name(node), Seen { beat, revision: 1, is_live })
         };
-        let view = View { others: others.iter().map(seen).collect(), ..View::default() };
-        holders(copies, &name("own"), &view).to_string()
+        View { others: others.iter().map(seen).collect(), is_settled: true, ..View::default() }
+    }
+
+    /// What `own` holds a new map with, beside these others.
+    fn chosen(copies: usize, others: &[(&str, bool, u64, usize)]) -> String {
+        holders(copies, &name("own"), &view_of(others)).to_string()
+    }
+
+    #[test]
+    fn a_node_that_was_just_started_waits_for_others_that_may_be_there() {
+        let others = [("a", true, 5, 0), ("b", false, 5, 0)];
+        let knows =
+            |copies, beats, is_settled| knows_others(copies, &View { beats, is_settled, ..view_of(&others) });
+        assert!(knows(1, 0, true) && knows(2, 0, true), "as many as hold it are live");
+        assert!(!knows(3, OWN_BEATS - 1, true) && knows(3, OWN_BEATS, true), "no third has beaten by then");
+        assert!(!knows(1, 100, false), "one that was heard of may be gone");
     }
 
     #[test]
