@@ -285,6 +285,7 @@ fn a_second_process_under_the_name_of_a_node_disturbs_nobody() {
     let (a, b) = (Server::start(&nats, "a", folders[0].path()), Server::start(&nats, "b", folders[1].path()));
     assert!(a.create("hall"));
     retried(|| leader(&[&a, &b], "hall").insert("hall", 0));
+    waited("both have it", || a.version("hall").is_some() && a.version("hall") == b.version("hall"));
     let epoch = || match &*b.runtime.block_on(b.service.lead_of(&name("hall"))).unwrap().borrow() {
         Lead::Shared { epoch, .. } => *epoch,
         other => panic!("{other:?}"),
