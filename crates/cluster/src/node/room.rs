@@ -21,9 +21,9 @@ pub(super) fn holders(copies: usize, own: &NodeName, view: &View) -> Holders {
     Holders::Only([own].into_iter().chain(others).cloned().collect())
 }
 
-/// True once a node knows of the others what it takes to choose `copies` holders of a map: which of those it heard of are
-/// live, and that no more will be heard of soon where they are fewer. A node that runs beats every two seconds, so whoever
-/// has beaten as often as it takes to count another as gone has heard of all that run.
+/// True once a node knows of the others what it takes to choose `copies` holders of a map: which of those it heard of
+/// are live, and that no more will be heard of soon where they are fewer. A node that runs beats every two seconds, so
+/// whoever has beaten as often as it takes to count another as gone has heard of all that run.
 pub(super) fn knows_others(copies: usize, view: &View) -> bool {
     let live = view.others.values().filter(|seen| seen.is_live).count();
     view.is_settled && (live + 1 >= copies || view.beats >= OWN_BEATS)
