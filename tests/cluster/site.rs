@@ -22,6 +22,9 @@ pub(crate) const NODES: usize = 3;
 /// How long anything may take that is to come by itself: the machine may be busy with other tests.
 pub(crate) const WITHIN: Duration = Duration::from_secs(60);
 
+/// Why a change is refused that was not made, while NATS is late.
+const LATE: [&str; 2] = ["no_quorum", "not_leader"];
+
 /// A site: three servers of NATS and three nodes.
 pub(crate) struct Site {
     pub(crate) nats: NatsServers,
@@ -225,27 +228,27 @@ impl Site {
     pub(crate) fn create(&self, map: &MapName) {
         let client = self.client(&self.all_grpc(0));
         let settings = NewMap { levels: Some(2), ..NewMap::of(0.5) };
-        self.answered(async || client.create_map(map, settings).await);
+        self.answered(&LATE, async || client.create_map(map, settings).await);
     }
 
     /// Deletes a map by way of a node.
     pub(crate) fn delete(&self, index: usize, map: &MapName) {
         let client = self.client(&self.grpc(index));
-        self.answered(async || client.delete_map(map).await);
+        self.answered(&LATE, async || client.delete_map(map).await);
     }
 
-    /// Asks again while NATS is late: such a refusal says that nothing was changed.
-    fn answered<T>(&self, ask: impl AsyncFn() -> Result<T, ClientError>) -> T {
+    /// Asks until it is answered, again while it is refused for one of these reasons.
+    fn answered<T>(&self, passing: &[&str], ask: impl AsyncFn() -> Result<T, ClientError>) -> T {
         let begun = Instant::now();
         loop {
             match self.runtime.block_on(ask()) {
                 Ok(answer) => return answer,
                 Err(error) => {
-                    let is_late = error.reason().is_some_and(|it| ["no_quorum", "not_leader"].contains(&it));
-                    assert!(is_late && begun.elapsed() < WITHIN, "{error}");
+                    let is_passing = error.reason().is_some_and(|reason| passing.contains(&reason));
+                    assert!(is_passing && begun.elapsed() < WITHIN, "{error}");
                 }
             }
-            std::thread::sleep(Duration::from_millis(50));
+            std::thread::sleep(Duration::from_millis(20));
         }
     }
 
@@ -258,18 +261,9 @@ impl Site {
             at_guess: true,
             ..ScanRequest::new(RobotName::new("late").unwrap(), vec![place].into())
         };
-        let begun = Instant::now();
-        loop {
-            match self.runtime.block_on(client.insert_scan(map, scan.clone())) {
-                Ok(answer) => return answer.version.revision,
-                Err(error) => {
-                    let reason = error.reason().unwrap_or_default();
-                    assert!(["no_quorum", "not_leader", "outcome_unknown"].contains(&reason), "{error}");
-                    assert!(begun.elapsed() < WITHIN, "{error}");
-                }
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        let passing = [&LATE[..], &["outcome_unknown"]].concat();
+        let answer = self.answered(&passing, async || client.insert_scan(map, scan.clone()).await);
+        answer.version.revision
     }
 
     /// Revision, content, scans and voxels of a map at a node.
